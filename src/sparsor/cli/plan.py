@@ -1,0 +1,356 @@
+"""`sparsor plan`, also `generate-mission`: from a box on the map to a mission folder."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sparsor.cli.console import (
+    Json,
+    Quiet,
+    Talk,
+    Verbose,
+    print_json,
+    print_table,
+    progress_bar,
+    reporting,
+    warn,
+)
+
+if TYPE_CHECKING:
+    from sparsor.journeys.planning import PlannedMission
+    from sparsor.mission.specification import MissionSpecification
+
+WHERE, PRIOR, SEARCH, FLIGHT, OUTPUT = "Where", "What maps look like", "Search", "Flight", "Output"
+Box = tuple[float, float, float, float]
+
+
+def _option(panel: str, help_text: str, *names: str, metavar: str | None = None) -> Any:  # noqa: ANN401
+    return typer.Option(*names, help=help_text, rich_help_panel=panel, metavar=metavar, show_default=False)
+
+
+@reporting
+def plan(
+    mission_file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[MISSION.toml]",
+            help="Make the mission that this file specifies; options change parts of it.",
+            show_default=False,
+        ),
+    ] = None,
+    bbox: Annotated[
+        Box | None,
+        _option(
+            WHERE,
+            "Box in degrees. West greater than east crosses the antimeridian.",
+            "--bbox",
+            metavar="W S E N",
+        ),
+    ] = None,
+    area: Annotated[
+        Path | None,
+        _option(WHERE, "GeoJSON or KML with a polygon, instead of a box.", "--area", metavar="FILE"),
+    ] = None,
+    name: Annotated[str | None, _option(OUTPUT, "Name of the mission and its files.", "--name")] = None,
+    output: Annotated[
+        Path | None,
+        _option(OUTPUT, "Folder to write to (default: missions/NAME).", "--output", "-o", metavar="DIR"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over another mission.", rich_help_panel=OUTPUT)] = False,
+    export: Annotated[
+        str | None,
+        _option(OUTPUT, "Further files, comma separated: waypoints,kml,geojson.", "--export", metavar="FORMATS"),
+    ] = None,
+    field: Annotated[
+        Path | None,
+        _option(
+            PRIOR,
+            "Learn from this field: GeoTIFF, NetCDF or a heatmap picture (default: the built-in synthetic field).",
+            "--field",
+            metavar="FILE",
+        ),
+    ] = None,
+    variable: Annotated[str | None, _option(PRIOR, "NetCDF variable, or GeoTIFF band.", "--variable")] = None,
+    field_time: Annotated[
+        str | None,
+        _option(PRIOR, "NetCDF time step: its index or the beginning of its date.", "--field-time"),
+    ] = None,
+    field_bbox: Annotated[
+        Box | None, _option(PRIOR, "Where a picture lies.", "--field-bbox", metavar="W S E N")
+    ] = None,
+    field_colormap: Annotated[
+        str | None, _option(PRIOR, "Colour map a picture was drawn with, e.g. viridis.", "--field-colormap")
+    ] = None,
+    field_range: Annotated[
+        tuple[float, float] | None,
+        _option(PRIOR, "Values of a picture's first and last colour.", "--field-range", metavar="LO HI"),
+    ] = None,
+    model: Annotated[Path | None, _option(PRIOR, "Model made by 'sparsor learn'.", "--model", metavar="FILE")] = None,
+    atoms: Annotated[int | None, _option(PRIOR, "Atoms of the dictionary, K (default: 256).", "--atoms")] = None,
+    planner: Annotated[
+        str | None, _option(SEARCH, "monte-carlo, the paper's Algorithm 1.", "--planner", metavar="NAME")
+    ] = None,
+    paper: Annotated[
+        bool,
+        typer.Option(
+            "--paper",
+            help="Exactly as the paper: K = N atoms, uncentred, plain path, no budget.",
+            rich_help_panel=SEARCH,
+        ),
+    ] = False,
+    budget: Annotated[
+        str | None,
+        _option(
+            SEARCH,
+            "Longest flight: 10% (of full coverage), 12km, 25min (default: 10%).",
+            "--budget",
+            metavar="LIMIT",
+        ),
+    ] = None,
+    rows: Annotated[int | None, _option(SEARCH, "Rows of the measurement matrix, M (default: 35).", "--rows")] = None,
+    probability: Annotated[
+        float | None,
+        _option(SEARCH, "Probability of a 1 in it, p (default: searched within the budget).", "--probability"),
+    ] = None,
+    theta: Annotated[
+        int | None,
+        _option(
+            SEARCH,
+            "Enhanced Sparsification: fewer ones than this empty a column (default: searched).",
+            "--theta",
+        ),
+    ] = None,
+    lasso: Annotated[
+        float | None, _option(SEARCH, "l1 weight lambda (default: the model's choice).", "--lasso")
+    ] = None,
+    lambda_valid: Annotated[
+        float | None, _option(SEARCH, "Weight of the validation error (default: 1).", "--lambda-valid")
+    ] = None,
+    lambda_path: Annotated[
+        float | None,
+        _option(SEARCH, "Weight of the path length; turns the default budget off.", "--lambda-path"),
+    ] = None,
+    lambda_incoh: Annotated[float | None, _option(SEARCH, "Weight of the incoherence.", "--lambda-incoh")] = None,
+    iterations: Annotated[int | None, _option(SEARCH, "Monte-Carlo samples (default: 4000).", "--iterations")] = None,
+    time: Annotated[
+        float | None,
+        _option(SEARCH, "Go on for this long; the plan then depends on the machine.", "--time", metavar="SECONDS"),
+    ] = None,
+    seed: Annotated[int | None, _option(SEARCH, "Seed of the search (default: 0).", "--seed")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            help="Threads (default: one a core); the plan is the same for any number.",
+            rich_help_panel=SEARCH,
+            min=1,
+            show_default=False,
+        ),
+    ] = None,
+    vehicle: Annotated[
+        str | None, _option(FLIGHT, "quad, or a profile of your own (.toml) (default: quad).", "--vehicle")
+    ] = None,
+    autopilot: Annotated[
+        str | None, _option(FLIGHT, "ardupilot or px4 (default: ardupilot).", "--autopilot", metavar="NAME")
+    ] = None,
+    altitude: Annotated[
+        float | None, _option(FLIGHT, "Height above home, m (default: 50).", "--altitude", metavar="M")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        _option(FLIGHT, "Speed along legs, m/s (default: the vehicle's).", "--speed", metavar="M_S"),
+    ] = None,
+    hold: Annotated[
+        float | None, _option(FLIGHT, "Dwell time at each stop, s (default: 5).", "--hold", metavar="S")
+    ] = None,
+    home: Annotated[
+        tuple[float, float] | None,
+        _option(FLIGHT, "Take-off and landing place (default: the first stop).", "--home", metavar="LON LAT"),
+    ] = None,
+    home_altitude: Annotated[
+        float | None,
+        _option(FLIGHT, "Height of home above mean sea level, m.", "--home-altitude", metavar="M"),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Plan the flight whose samples rebuild the whole map, and write it as a QGroundControl plan.
+
+    generate-mission --bbox 51.50 25.27 51.53 25.30 --name doha
+    """
+    talk = Talk.of(quiet=quiet, verbose=verbose)
+    given = {
+        "name": name,
+        "area": {"bbox": bbox, "file": area},
+        "prior": {
+            "field": field,
+            "variable": variable,
+            "time": field_time,
+            "field_bbox": field_bbox,
+            "field_colormap": field_colormap,
+            "field_range": field_range,
+            "model": model,
+            "atoms": atoms,
+        },
+        "search": {
+            "planner": planner,
+            "paper": paper or None,
+            "rows": rows,
+            "probability": probability,
+            "theta": theta,
+            "lasso": lasso,
+            "lambda_valid": lambda_valid,
+            "lambda_path": lambda_path,
+            "lambda_incoh": lambda_incoh,
+            "iterations": iterations,
+            "time_s": time,
+            "seed": seed,
+            "budget": budget,
+        },
+        "flight": {
+            "vehicle": vehicle,
+            "autopilot": autopilot,
+            "altitude_m": altitude,
+            "speed_m_s": speed,
+            "hold_s": hold,
+            "home": home,
+            "home_altitude_m": home_altitude,
+        },
+        "output": {"export": _formats(export)},
+    }
+    spec, folder = _request(given, mission_file, output)
+    from sparsor.journeys.planning import check_folder, plan_mission, write_mission
+
+    check_folder(spec, folder, force=force)
+    with progress_bar(talk) as progress:
+        mission = plan_mission(spec, workers=workers, progress=progress)
+    written = write_mission(mission, folder)
+    result = _result(mission, folder)
+    if as_json:
+        print_json(result)
+        return
+    warn(mission.warnings, talk)
+    if talk is Talk.QUIET:
+        typer.echo(written[f"{spec.name}.plan"])
+        return
+    print_table(_summary(mission, talk), spec.name)
+    typer.echo(f"written to {folder}: {', '.join(written)}")
+
+
+def _request(
+    given: dict[str, Any], mission_file: Path | None, output: Path | None
+) -> tuple[MissionSpecification, Path]:
+    """Return what is asked for and the folder it goes to."""
+    from sparsor.errors import MissionError
+    from sparsor.mission.specification import changed, read_specification, specification
+
+    if mission_file is not None:
+        spec = changed(read_specification(mission_file), given, base=Path.cwd())
+        own = mission_file.name == "mission.toml" and given["name"] is None
+        beside = mission_file.parent if own else Path("missions") / spec.name
+        return spec, output or beside
+    box, area = given["area"]["bbox"], given["area"]["file"]
+    if box is None and area is None:
+        raise MissionError(
+            "where? Give --bbox WEST SOUTH EAST NORTH in degrees, --area FILE.geojson, or a mission.toml"
+        )
+    if box is not None and area is None:
+        from sparsor.geodesy import BoundingBox
+
+        BoundingBox(*box)  # its errors say more than the specification's
+    if given["name"] is None:
+        given["name"] = output.name if output is not None else _default_name(box, area)
+    spec = specification(given, base=Path.cwd())
+    return spec, output or Path("missions") / spec.name
+
+
+def _default_name(box: Box | None, area: Path | None) -> str:
+    if area is not None:
+        return re.sub(r"[^A-Za-z0-9._-]+", "-", area.stem).strip("-._") or "mission"
+    assert box is not None
+    return "box_" + "_".join(f"{side:g}" for side in box)
+
+
+def _formats(export: str | None) -> list[str] | None:
+    return None if export is None else [part.strip() for part in export.split(",") if part.strip()]
+
+
+def _result(mission: PlannedMission, folder: Path) -> dict[str, object]:
+    spec, found = mission.specification, mission.candidate
+    return {
+        "plans": [str(folder / f"{spec.name}.plan")],
+        "sidecar": str(folder / f"{spec.name}.npz"),
+        "stops": int(found.stops.size),
+        "cells_measured": int(found.stops.size),
+        "cells_flown_over": mission.cells_flown_over,
+        "path_length_m": mission.path_length_m,
+        "path_length_cells": found.length_cells,
+        "coverage_fraction": mission.coverage_fraction,
+        "flight_time_s": mission.flight_time_s,
+        "endurance_s": mission.vehicle.endurance_s,
+        "flyable": mission.flyable,
+        "sorties": 1,
+        "expected_relative_error": mission.expected_relative_error,
+        "expected_relative_error_cells": mission.expected_relative_error_cells,
+        "planner": spec.search.planner,
+        "probability": found.probability,
+        "theta": found.theta,
+        "cost": found.cost,
+        "incoherence": found.incoherence,
+        "seed": spec.search.seed,
+        "warnings": list(mission.warnings),
+    }
+
+
+def _summary(mission: PlannedMission, talk: Talk) -> list[tuple[str, str]]:
+    spec, found, vehicle = mission.specification, mission.candidate, mission.vehicle
+    box = mission.place.grid.box
+    rows, columns = mission.place.grid.shape
+    model = mission.prior.model
+    table = [
+        (
+            "box",
+            f"{box.east_m / 1000:.4g} km east-west, {box.north_m / 1000:.4g} km north-south, {rows} x {columns} cells",
+        ),
+        ("stops", f"{found.stops.size} cells measured, {mission.cells_flown_over} flown over"),
+        (
+            "distance",
+            f"{mission.path_length_m / 1000:.2f} km over the stops, {mission.coverage_fraction:.1%} of full coverage "
+            f"({mission.place.full_coverage_m / 1000:.0f} km)",
+        ),
+        (
+            "time in the air",
+            f"{mission.flight_time_s / 60:.1f} min; {vehicle.name}: {vehicle.endurance_s / 60:.0f} min endurance, "
+            f"{mission.usable_s / 60:.0f} min less reserve",
+        ),
+        ("flyable", "yes, by endurance" if mission.flyable else "no: a planning study (see the warnings)"),
+        (
+            "expected error",
+            f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
+            f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells",
+        ),
+        (
+            "prior",
+            f"{model.provenance.get('source', 'model')}, windows of {model.window_m[0] / 1000:.4g} x "
+            f"{model.window_m[1] / 1000:.4g} km, {model.atoms} atoms",
+        ),
+    ]
+    if talk is Talk.VERBOSE:
+        weights = mission.weights
+        table += [
+            (
+                "sample",
+                f"r = {found.sample} of {spec.search.iterations}, p = {found.probability:.4g}, theta = {found.theta}",
+            ),
+            (
+                "cost",
+                f"{found.cost:.6g} = {weights.valid:g} x {found.error:.6g} + {weights.path:.4g} x "
+                f"{found.length_cells:.4g} + {weights.incoherence:.4g} x {found.incoherence:.4g}",
+            ),
+        ]
+    return table

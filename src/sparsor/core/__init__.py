@@ -1,0 +1,1 @@
+"""What every stage may use: atomic files, progress, random streams, workers."""

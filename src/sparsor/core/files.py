@@ -1,0 +1,105 @@
+"""Files that are either the old ones or the new ones, never half of one."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sparsor.errors import OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write several files into a folder, all of them or none.
+
+    Everything is first written beside its target under a temporary name and flushed to the disk; only when
+    all of it is there are the files renamed. A full disk or an interrupt on the way leaves what was there
+    before.
+
+    Parameters
+    ----------
+    folder : Path
+        Made, with its parents, when it does not exist.
+    contents : mapping of str to bytes
+        File name inside `folder` to its contents.
+
+    Raises
+    ------
+    OutputError
+        When the folder or a file cannot be written.
+    """
+    made = _missing_folders(folder)
+    written: list[tuple[Path, Path]] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            target = folder / name
+            temporary = _write_temporary(target, content)
+            written.append((temporary, target))
+        for temporary, target in written:
+            temporary.replace(target)
+    except OSError as error:
+        raise OutputError(
+            f"cannot write to '{folder}': {error.strerror or error}. Free some space or choose another folder with -o."
+        ) from error
+    finally:
+        for temporary, _ in written:
+            temporary.unlink(missing_ok=True)
+        _remove_empty(made)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write one file as `write_files` does.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    write_files(path.parent, {path.name: content})
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's contents, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _write_temporary(target: Path, content: bytes) -> Path:
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # mkstemp makes the file private; what we leave behind has the permissions a plain open() gives.
+        temporary.chmod(0o666 & ~_umask())
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    return temporary
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    return [path for path in (folder, *folder.parents) if not path.exists()]
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Remove the folders that were made for a write that then failed; deepest first."""
+    for path in folders:
+        try:
+            path.rmdir()
+        except OSError:
+            return

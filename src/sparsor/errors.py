@@ -1,0 +1,55 @@
+"""The exception tree: every error that sparsor raises on purpose.
+
+Each message says what is wrong, the value that was given, what is allowed and the next thing to try. The
+command line prints the message and ends with ``exit_code``; programs that import sparsor catch the classes.
+"""
+
+from __future__ import annotations
+
+
+class SparsorError(Exception):
+    """Base of everything sparsor raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(SparsorError, ValueError):
+    """What was asked for is wrong: nothing was started, nothing was written."""
+
+    exit_code = 2
+
+
+class BoxError(InputError):
+    """A bounding box that is not one: swapped sides, a latitude out of range, no size or too large."""
+
+
+class AreaError(InputError):
+    """An area file that cannot be read or holds no usable polygon."""
+
+
+class FieldError(InputError):
+    """A field of training values that cannot be read or used."""
+
+
+class ModelError(InputError):
+    """A model file that cannot be read, or that does not fit what is asked of it."""
+
+
+class DesignError(InputError):
+    """Search settings outside their range."""
+
+
+class BudgetError(InputError):
+    """A flight budget that cannot be read, or that no route meets."""
+
+
+class VehicleError(InputError):
+    """A vehicle or sensor profile that is unknown or outside its range."""
+
+
+class MissionError(InputError):
+    """A mission specification, plan or mission folder that cannot be used."""
+
+
+class OutputError(SparsorError):
+    """The result could not be written: the folder is read-only, full or gone."""

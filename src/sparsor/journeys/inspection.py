@@ -1,0 +1,153 @@
+"""What a file holds, in words and as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from sparsor.errors import MissionError
+from sparsor.mission import describe_plan, read_plan
+from sparsor.mission.sidecar import Sidecar, content_hash, read_sidecar
+from sparsor.mission.specification import read_specification
+from sparsor.prior.model import Model, model_from_arrays, read_npz
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a file is and holds.
+
+    Parameters
+    ----------
+    kind : {"plan", "model", "sidecar", "specification"}
+    contents : dict
+        Plain values for JSON, SI units in the names.
+    lines : tuple of str
+        The same in words.
+    """
+
+    kind: str
+    contents: dict[str, Any]
+    lines: tuple[str, ...]
+
+
+def inspect_file(path: Path) -> Inspection:
+    """Say what a file holds.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, its kind is unknown, or it is damaged.
+    """
+    if path.is_dir():
+        plans = sorted(path.glob("*.plan"))
+        if not plans:
+            raise MissionError(f"'{path}' is a folder without a .plan; give a file")
+        path = plans[0]
+    if not path.is_file():
+        raise MissionError(f"there is no file '{path}'")
+    if path.suffix == ".plan":
+        return _plan(path)
+    if path.suffix == ".npz":
+        arrays = read_npz(path)
+        if "sidecar" in arrays:
+            return _sidecar(read_sidecar(path), path)
+        return _model(model_from_arrays(arrays, f"'{path}'"), path)
+    if path.suffix == ".toml":
+        return _specification(path)
+    raise MissionError(f"'{path}' is of an unknown kind; known are .plan, .npz (model or sidecar) and .toml")
+
+
+def _plan(path: Path) -> Inspection:
+    description = describe_plan(read_plan(path))
+    edited = _edited(path)
+    lines = [f"{path}: a QGroundControl plan", *description.lines]
+    if edited is not None:
+        lines.append(
+            "Edited since sparsor wrote it." if edited else "Unchanged since sparsor wrote it (by its sidecar)."
+        )
+    return Inspection("plan", {**asdict(description), "edited": edited}, tuple(lines))
+
+
+def _edited(path: Path) -> bool | None:
+    """Return whether a plan differs from what its sidecar remembers; None without a sidecar."""
+    for candidate in sorted(path.parent.glob("*.npz")):
+        try:
+            remembered = read_sidecar(candidate).plans.get(path.name)
+        except MissionError:
+            continue
+        if remembered is not None:
+            return content_hash(path.read_bytes()) != remembered
+    return None
+
+
+def _model_contents(model: Model) -> dict[str, Any]:
+    return {
+        "shape": list(model.shape),
+        "atoms": model.atoms,
+        "centred": model.centred,
+        "lasso": model.lasso_weight,
+        "window_m": list(model.window_m),
+        "scale": list(model.scale),
+        "unit": model.unit,
+        "validation_maps": len(model.validation),
+        "kernel": asdict(model.kernel),
+        "provenance": dict(model.provenance),
+    }
+
+
+def _model_lines(model: Model) -> list[str]:
+    east_m, north_m = model.window_m
+    return [
+        f"Model of {model.shape[0]} x {model.shape[1]} cells, "
+        f"windows of {east_m / 1000:.4g} x {north_m / 1000:.4g} km.",
+        f"Dictionary: {model.provenance.get('dictionary', 'learned')}, {model.atoms} atoms, "
+        f"{'centred' if model.centred else 'uncentred'}; lambda {model.lasso_weight:g}.",
+        f"Scale: 0..1 is {model.scale[0]:.4g}..{model.scale[1]:.4g} {model.unit}.",
+        f"Kernel: exponential, decay over {model.kernel.length_cells:.1f} cells.",
+        f"{len(model.validation)} validation maps. From: {model.provenance.get('source', 'unknown')}.",
+    ]
+
+
+def _model(model: Model, path: Path) -> Inspection:
+    return Inspection("model", _model_contents(model), (f"{path}: a model", *_model_lines(model)))
+
+
+def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
+    box = sidecar.grid.box
+    known = "" if sidecar.home_altitude_known else " (unknown, written as 0)"
+    lines = (
+        f"{path}: the sidecar of mission '{sidecar.name}'",
+        f"Box: {' '.join(f'{side:g}' for side in box.as_tuple())} (west south east north), "
+        f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside.",
+        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {sidecar.hold_s:g} s each.",
+        f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
+        f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast "
+        "(|s - s'| / |s - mean(s)|, from the sums).",
+        *_model_lines(sidecar.model),
+    )
+    contents = {
+        "name": sidecar.name,
+        "bbox": list(box.as_tuple()),
+        "stops": int(sidecar.stops.size),
+        "altitude_m": sidecar.altitude_m,
+        "hold_s": sidecar.hold_s,
+        "home": list(sidecar.home),
+        "home_altitude_known": sidecar.home_altitude_known,
+        "expected": dict(sidecar.expected),
+        "plans": dict(sidecar.plans),
+        "model": _model_contents(sidecar.model),
+    }
+    return Inspection("sidecar", contents, lines)
+
+
+def _specification(path: Path) -> Inspection:
+    spec = read_specification(path)
+    contents = spec.model_dump(mode="json", exclude_none=True)
+    lines = [f"{path}: the specification of mission '{spec.name}'"]
+    for section, values in contents.items():
+        if isinstance(values, dict):
+            lines += [f"{section}.{key}: {value}" for key, value in values.items()]
+    return Inspection("specification", contents, tuple(lines))

@@ -1,0 +1,234 @@
+"""Which model a mission is planned with: built in, learned from a field, or a file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sparsor.core.files import sha256_of, write_file
+from sparsor.core.metrics import centred_relative_error
+from sparsor.core.progress import Progress, silent
+from sparsor.design import unit_legs
+from sparsor.design.lars import lasso
+from sparsor.design.tuning import choose_lasso_weight
+from sparsor.errors import ModelError, OutputError
+from sparsor.prior.builtin import SHAPE, SIDES_M, builtin_maps, builtin_model, nearest_side_m
+from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, split_maps, untuned_model
+from sparsor.prior.mismatch import mismatch_factor
+from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz, read_model
+from sparsor.prior.reading import read_field
+from sparsor.prior.windows import ground_windows, nearest_resolved_m
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from sparsor.geodesy import BoundingBox
+    from sparsor.mission.specification import PriorSection
+    from sparsor.prior.dictionary import DictionaryName
+    from sparsor.prior.field import Field
+
+# Bumped whenever learning gives other models, so that cached ones are not taken for them.
+_LEARNING_VERSION = 1
+_SAME_SIZE = 1.02
+_BETWEEN_SIDES = 1.6  # no box between the built-in sizes is further from one than this
+
+
+@dataclass(frozen=True)
+class PriorChoice:
+    """A model for a box, and what has to be said about it.
+
+    Parameters
+    ----------
+    model : Model
+    field : Field or None
+        What it was learned from, when that is at hand.
+    synthetic : bool
+        Whether the model is the built-in one.
+    widening : float
+        Factor, 1 or above, on the expected error where the model's windows are not of the box's size.
+    warnings : tuple of str
+    """
+
+    model: Model
+    field: Field | None
+    synthetic: bool
+    widening: float
+    warnings: tuple[str, ...]
+
+
+def choose_prior(
+    request: PriorSection, box: BoundingBox, *, paper: bool = False, progress: Progress = silent
+) -> PriorChoice:
+    """Return the model that a mission over `box` is planned with.
+
+    Parameters
+    ----------
+    request : PriorSection
+    box : BoundingBox
+    paper : bool
+        The paper's dictionary: as many atoms as cells, learned without centring.
+    progress : Progress
+
+    Raises
+    ------
+    FieldError, ModelError
+        When the field or model cannot be used, or a model does not hold the dictionary asked for.
+    """
+    if request.model is not None:
+        return _from_file(request, box, paper=paper)
+    atoms = request.atoms or (SHAPE[0] * SHAPE[1] if paper else DEFAULT_ATOMS)
+    if request.field is None:
+        return _built_in(box, atoms, paper=paper, progress=progress)
+    return _from_field(request, box, atoms, paper=paper, progress=progress)
+
+
+def learn_model(
+    maps: TrainingMaps,
+    *,
+    atoms: int = DEFAULT_ATOMS,
+    centred: bool = True,
+    dictionary: DictionaryName = "learned",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Model:
+    """Learn a model from maps and choose its lambda on the validation maps.
+
+    Raises
+    ------
+    ModelError
+        When the maps have no contrast, or the number of atoms is out of range.
+    """
+    model = untuned_model(maps, atoms=atoms, centred=centred, dictionary=dictionary, seed=seed, progress=progress)
+    progress("choosing lambda", 0, 1)
+    weight = choose_lasso_weight(model.dictionary, model.validation - model.mean, unit_legs(model.shape), seed=seed)
+    progress("choosing lambda", 1, 1)
+    return replace(model, lasso_weight=weight)
+
+
+def representation_error(model: Model) -> float:
+    """Return how well the dictionary represents validation maps that are wholly known.
+
+    Mean of ``|s - s_hat| / |s - mean(s)|`` with each map coded by the LASSO over all its cells, at the
+    model's lambda: what is left when nothing but the dictionary limits the reconstruction.
+    """
+    coded = lasso(model.dictionary, model.validation - model.mean, model.lasso_weight)
+    return float(centred_relative_error(model.validation, coded @ model.dictionary.T + model.mean).mean())
+
+
+def cache_folder() -> Path:
+    """Return the folder for models learned on the way: ``SPARSOR_CACHE_DIR``, else the user's cache."""
+    if given := os.environ.get("SPARSOR_CACHE_DIR"):
+        return Path(given)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("sparsor", appauthor=False)
+
+
+def _from_file(request: PriorSection, box: BoundingBox, *, paper: bool) -> PriorChoice:
+    path = request.model
+    assert path is not None
+    model = read_model(path)
+    cells = model.shape[0] * model.shape[1]
+    if request.atoms is not None and request.atoms != model.atoms:
+        raise ModelError(
+            f"'{path}' holds {model.atoms} atoms, --atoms asks for {request.atoms}: leave --atoms out, or "
+            "learn a model with that many ('sparsor learn --atoms')"
+        )
+    if paper and (model.centred or model.atoms != cells):
+        raise ModelError(
+            f"--paper needs an uncentred dictionary of {cells} atoms; '{path}' holds "
+            f"{'a centred' if model.centred else 'an uncentred'} one of {model.atoms}: learn it with "
+            f"'sparsor learn --uncentred --atoms {cells}', or leave --model out"
+        )
+    widening, said = _size_difference(model, box)
+    return PriorChoice(model, None, False, widening, said)
+
+
+def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) -> PriorChoice:
+    side = nearest_side_m(box.east_m, box.north_m)
+    if atoms == DEFAULT_ATOMS and not paper:
+        model = builtin_model(side)
+    else:
+        key = {"built-in": side, "atoms": atoms, "centred": not paper}
+        model = _cached(key, lambda: learn_model(builtin_maps(side), atoms=atoms, centred=not paper, progress=progress))
+    warnings = ["The prior is the built-in synthetic Gulf NO2 field, not a measurement: give --field or --model."]
+    size = (box.east_m * box.north_m) ** 0.5
+    widening = mismatch_factor(max(side / size, size / side))
+    if not SIDES_M[0] / _BETWEEN_SIDES <= size <= SIDES_M[-1] * _BETWEEN_SIDES:
+        warnings.append(
+            f"The built-in models cover boxes of {SIDES_M[0] / 1000:g} to {SIDES_M[-1] / 1000:g} km; for one "
+            f"of {size / 1000:.3g} km the expected error is widened {widening:.2f} times."
+        )
+    return PriorChoice(model, None, True, widening, tuple(warnings))
+
+
+def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) -> PriorChoice:
+    assert request.field is not None
+    field = read_field(
+        request.field,
+        variable=request.variable,
+        time=request.time,
+        box=request.field_bbox,
+        colormap=request.field_colormap,
+        value_range=request.field_range,
+    )
+    window_m = nearest_resolved_m(field, box.east_m, box.north_m, SHAPE)
+    key = {
+        **request.model_dump(mode="json", exclude={"field", "model"}),
+        "field": sha256_of(request.field),
+        "window_m": [round(side, 3) for side in window_m],
+        "atoms": atoms,
+        "centred": not paper,
+    }
+
+    def learn() -> Model:
+        progress("cutting windows", 0, 1)
+        maps = split_maps([ground_windows(field, *window_m, SHAPE)], SHAPE)
+        progress("cutting windows", 1, 1)
+        return learn_model(maps, atoms=atoms, centred=not paper, progress=progress)
+
+    model = _cached(key, learn)
+    # The cache knows a field by its contents: the file it was first read from may have had another name.
+    model = replace(model, provenance={**model.provenance, "source": field.source})
+    widening, said = _size_difference(model, box)
+    notes = [*field.notes, *said]
+    if model.atoms < atoms:
+        notes.append(
+            f"The field gave {model.provenance['training_maps']} training windows, so the dictionary has "
+            f"{model.atoms} atoms, not {atoms}."
+        )
+    return PriorChoice(model, field, False, widening, tuple(notes))
+
+
+def _size_difference(model: Model, box: BoundingBox) -> tuple[float, tuple[str, ...]]:
+    east_m, north_m = model.window_m
+    ratio = ((east_m * north_m) / (box.east_m * box.north_m)) ** 0.5
+    if 1 / _SAME_SIZE <= ratio <= _SAME_SIZE:
+        return 1.0, ()
+    widening = mismatch_factor(max(ratio, 1 / ratio))
+    sentence = (
+        f"The model was learned from windows of {east_m / 1000:.4g} x {north_m / 1000:.4g} km, the box is "
+        f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km: the expected error is widened "
+        f"{widening:.2f} times."
+    )
+    return widening, (sentence,)
+
+
+def _cached(key: Mapping[str, object], learn: Callable[[], Model]) -> Model:
+    """Return the model of `key` from the user's cache, learning it when it is not there."""
+    text = json.dumps({**key, "learning": _LEARNING_VERSION}, sort_keys=True)
+    path = cache_folder() / f"model-{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"
+    try:
+        return read_model(path)
+    except ModelError:
+        pass  # not there, or damaged: learn it again
+    content = arrays_to_npz(model_arrays(learn()))
+    # A cache that cannot be written costs time the next time, no more.
+    with suppress(OutputError):
+        write_file(path, content)
+    return model_from_npz(content, "the model just learned")

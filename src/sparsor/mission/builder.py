@@ -1,0 +1,177 @@
+"""From a route to a plan: take-off, speed, stops, the way home, landing, fence and rally point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sparsor.errors import MissionError
+from sparsor.geodesy.lengths import distance_m, path_length_m
+from sparsor.mission.advice import build_warnings
+from sparsor.mission.fence import MAX_CORNERS, fence_around
+from sparsor.mission.items import change_speed, land, take_off, waypoint
+from sparsor.mission.plan import Home, MissionPlan, RallyPoint
+from sparsor.vehicle import Autopilot, Vehicle, autopilot_named, flight_seconds
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+# An autopilot stores positions as integers of 1e-7 degrees: what is written is what is flown.
+DECIMALS = 7
+MAX_SPEED_M_S = 200.0
+MAX_ALTITUDE_M = 20_000.0
+
+
+def build_mission(
+    stops_lon_deg: ArrayLike,
+    stops_lat_deg: ArrayLike,
+    *,
+    vehicle: Vehicle,
+    autopilot: Autopilot | str,
+    altitude_m: float,
+    home: Home | None = None,
+    speed_m_s: float | None = None,
+    hold_s: float = 0.0,
+    fence_margin_m: float = 50.0,
+) -> MissionPlan:
+    """Turn a route into a plan that a multirotor flies from take-off to landing.
+
+    Every leg is written out, the one home too: a return-to-launch item would fly straight home from wherever
+    it is reached, at a height of the vehicle's own. A first stop at home is a waypoint like any other.
+
+    Parameters
+    ----------
+    stops_lon_deg, stops_lat_deg : array_like (n,)
+        Stops in flight order, degrees; one or more.
+    vehicle : Vehicle
+    autopilot : Autopilot or str
+        ``"ardupilot"`` or ``"px4"``.
+    altitude_m : float
+        Of the flight, above home, metres.
+    home : Home, optional
+        Default: the first stop, its altitude unknown.
+    speed_m_s : float, optional
+        Ground speed along legs; default the vehicle's cruise speed.
+    hold_s : float
+        Time at each stop, seconds. ArduPilot keeps whole seconds: a fraction is rounded up.
+    fence_margin_m : float
+        Least distance between the flight and its fence, metres.
+
+    Returns
+    -------
+    MissionPlan
+        Its `warnings` are sentences for the person who flies it.
+
+    Raises
+    ------
+    MissionError
+        When a stop, the altitude, speed, hold or margin is out of range, or when there are more items than
+        the autopilot stores.
+    """
+    facts = autopilot if isinstance(autopilot, Autopilot) else autopilot_named(autopilot)
+    lon, lat = _checked_stops(stops_lon_deg, stops_lat_deg)
+    home = _rounded(home or Home(float(lon[0]), float(lat[0])))
+    speed = _within("speed", vehicle.cruise_m_s if speed_m_s is None else speed_m_s, MAX_SPEED_M_S, "m/s")
+    altitude = _within("altitude", altitude_m, MAX_ALTITUDE_M, "m above home")
+    hold = _checked_hold(hold_s, facts)
+    _check_count(lon.size, facts)
+
+    radius = vehicle.acceptance_radius_m
+    items = (
+        take_off(home.lon_deg, home.lat_deg, altitude, facts),
+        change_speed(speed),
+        *(waypoint(*stop, altitude, hold, radius, facts) for stop in zip(lon, lat, strict=True)),
+        waypoint(home.lon_deg, home.lat_deg, altitude, 0.0, radius, facts),
+        land(home.lon_deg, home.lat_deg, facts),
+    )
+    path_lon = np.concatenate([[home.lon_deg], lon, [home.lon_deg]])
+    path_lat = np.concatenate([[home.lat_deg], lat, [home.lat_deg]])
+    fence = fence_around(path_lon, path_lat, fence_margin_m, min(MAX_CORNERS, facts.max_fence_points))
+    plan = MissionPlan(
+        items=items,
+        home=home,
+        fences=(fence,),
+        rally_points=(RallyPoint(home.lon_deg, home.lat_deg, altitude),),
+        firmware_type=facts.firmware_type,
+        vehicle_type=vehicle.mav_type,
+        cruise_m_s=speed,
+        hover_m_s=speed,
+    )
+    return replace(plan, warnings=build_warnings(plan, vehicle, facts, hold_s))
+
+
+def flight_time_s(plan: MissionPlan, vehicle: Vehicle) -> float:
+    """Return the time from take-off to landing of a plan that `build_mission` made, seconds.
+
+    Equal to `sparsor.vehicle.flight_seconds` of its route: take-off, home to the first stop, legs, holds, the
+    way home, landing.
+
+    Raises
+    ------
+    MissionError
+        When the plan has no stop.
+    """
+    stops = plan.stops
+    if not stops:
+        raise MissionError("the plan has no waypoint: there is nothing to time")
+    lon = [stop.lon_deg for stop in stops]
+    lat = [stop.lat_deg for stop in stops]
+    ends = distance_m(plan.home.lon_deg, plan.home.lat_deg, [lon[0], lon[-1]], [lat[0], lat[-1]])
+    return flight_seconds(
+        vehicle,
+        path_length_m=path_length_m(lon, lat),
+        transit_m=float(ends.sum()),
+        stops=len(stops),
+        hold_s=stops[0].hold_s,
+        altitude_m=stops[0].altitude_m,
+        speed_m_s=plan.hover_m_s,
+    )
+
+
+def max_stops(autopilot: Autopilot) -> int:
+    """Return how many stops fit beside take-off, speed, way home and landing."""
+    return autopilot.max_items - 4 - int(autopilot.home_is_item_0)
+
+
+def _checked_stops(lon_deg: ArrayLike, lat_deg: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    lon = np.asarray(lon_deg, dtype=np.float64)
+    lat = np.asarray(lat_deg, dtype=np.float64)
+    if lon.ndim != 1 or lon.shape != lat.shape or lon.size == 0:
+        raise MissionError(
+            f"stops of shapes {lon.shape} and {lat.shape}; give as many longitudes as latitudes, one or more"
+        )
+    wrong = np.flatnonzero(~((np.abs(lon) <= 180) & (np.abs(lat) <= 90)))
+    if wrong.size:
+        first = int(wrong[0])
+        raise MissionError(
+            f"stop {first + 1} lies at longitude {lon[first]:g}, latitude {lat[first]:g}; "
+            "allowed are -180..180 and -90..90 degrees"
+        )
+    return lon.round(DECIMALS), lat.round(DECIMALS)
+
+
+def _rounded(home: Home) -> Home:
+    return replace(home, lon_deg=round(home.lon_deg, DECIMALS), lat_deg=round(home.lat_deg, DECIMALS))
+
+
+def _within(what: str, value: float, most: float, unit: str) -> float:
+    if not (math.isfinite(value) and 0 < value <= most):
+        raise MissionError(f"a flight {what} of {value:g} {unit}; it has to be above 0 and at most {most:g}")
+    return float(value)
+
+
+def _checked_hold(hold_s: float, autopilot: Autopilot) -> float:
+    if not (math.isfinite(hold_s) and 0 <= hold_s <= autopilot.max_hold_s):
+        raise MissionError(f"a hold of {hold_s:g} s; allowed are 0..{autopilot.max_hold_s} seconds at each stop")
+    return autopilot.written_hold_s(hold_s)
+
+
+def _check_count(stops: int, autopilot: Autopilot) -> None:
+    if stops > max_stops(autopilot):
+        raise MissionError(
+            f"{stops} stops are too many for one mission: {autopilot.title} stores {autopilot.max_items} "
+            f"items, which leaves {max_stops(autopilot)} stops; plan fewer or split the area"
+        )

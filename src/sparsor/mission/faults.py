@@ -1,0 +1,119 @@
+"""What is wrong with a plan, ours or anybody's, as far as the plan alone shows it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from shapely import Point, Polygon
+
+from sparsor.mission.items import (
+    DO_CHANGE_SPEED,
+    FLOWN_TO,
+    FRAME_MISSION,
+    FRAME_RELATIVE,
+    FRAME_TERRAIN,
+    LANDINGS,
+    NAV_RETURN_TO_LAUNCH,
+    TAKE_OFFS,
+    WAYPOINTS,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sparsor.mission.plan import Fence, MissionPlan
+
+FLIES = frozenset({1, 2, 3, 4, 13, 14, 15, *range(19, 26)})  # MAV_TYPE of what takes off
+COMMON_CEILING_M = 120.0
+
+
+def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
+    """Return a sentence for each fault noticed; none means that none was noticed, not that there is none."""
+    return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *_fenced(plan))
+
+
+def _order(plan: MissionPlan) -> Iterator[str]:
+    flown = [item for item in plan.items if item.command in FLOWN_TO]
+    if not flown:
+        yield "There is no item with a position: nothing is flown."
+        return
+    if plan.vehicle_type in FLIES and flown[0].command not in TAKE_OFFS:
+        yield "The first item with a position is not a take-off: a vehicle on the ground will not fly this."
+    last = plan.items[-1].command
+    if last == NAV_RETURN_TO_LAUNCH:
+        yield (
+            "The plan ends with a return to launch: a straight line home from the last waypoint, through "
+            "whatever is there."
+        )
+    elif plan.vehicle_type in FLIES and not any(item.command in LANDINGS for item in plan.items):
+        yield "The plan neither lands nor returns."
+
+
+def _positions(plan: MissionPlan) -> Iterator[str]:
+    for place, item in enumerate(plan.items, start=1):
+        if item.command not in FLOWN_TO:
+            continue
+        if not item.has_position:
+            yield f"Item {place} (command {item.command}) has no position: readers write 0/0 for it."
+        elif item.lat_deg == 0 and item.lon_deg == 0:
+            yield f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'."
+        if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
+            yield f"Item {place} is a waypoint {item.altitude_m:g} m above home."
+    heights = [item.altitude_m for item in plan.items if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE]
+    if heights and max(heights) > COMMON_CEILING_M:
+        yield (f"The highest waypoint is {max(heights):g} m above home; {COMMON_CEILING_M:g} m is a common ceiling.")
+
+
+def _limits(plan: MissionPlan) -> Iterator[str]:
+    facts = plan.autopilot
+    if facts is None:
+        return
+    counts = (
+        ("mission items", len(plan.items) + int(facts.home_is_item_0), facts.max_items),
+        ("fence points", sum(len(fence.lon_deg) for fence in plan.fences), facts.max_fence_points),
+        ("rally points", len(plan.rally_points), facts.max_rally_points),
+    )
+    for what, count, most in counts:
+        if count > most:
+            yield f"{count} {what} are more than the {most} that {facts.title} stores."
+    fractions = sum(item.command in WAYPOINTS and item.hold_s % 1 != 0 for item in plan.items)
+    if facts.whole_second_holds and fractions:
+        yield f"{fractions} waypoints hold for a fraction of a second, which {facts.title} drops."
+
+
+def _frames(plan: MissionPlan) -> Iterator[str]:
+    if plan.autopilot is None or plan.autopilot.name != "px4":
+        return
+    for place, item in enumerate(plan.items, start=1):
+        without_position = item.command in (NAV_RETURN_TO_LAUNCH, DO_CHANGE_SPEED)
+        if without_position and item.frame != FRAME_MISSION:
+            yield f"Item {place} (command {item.command}) is in frame {item.frame}; PX4 takes only frame 2."
+        elif item.frame == FRAME_TERRAIN:
+            yield f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses."
+
+
+def _fenced(plan: MissionPlan) -> Iterator[str]:
+    if not plan.fences and not plan.circles:
+        yield "There is no fence."
+    places = {"Home": (plan.home.lon_deg, plan.home.lat_deg)}
+    for place, item in enumerate(plan.items, start=1):
+        if item.has_position:
+            places[f"Item {place}"] = (item.lon_deg, item.lat_deg)
+    for number, fence in enumerate(plan.fences, start=1):
+        area = _plane(fence)
+        if not area.is_valid:
+            yield f"Fence polygon {number} crosses itself."
+            continue
+        for name, (lon, lat) in places.items():
+            if area.contains(Point(_near(lon, fence.lon_deg[0]), lat)) != fence.inclusion:
+                yield f"{name} lies {'outside' if fence.inclusion else 'inside'} fence polygon {number}."
+
+
+def _plane(fence: Fence) -> Polygon:
+    lon = [_near(value, fence.lon_deg[0]) for value in fence.lon_deg]
+    return Polygon(list(zip(lon, fence.lat_deg, strict=True)))
+
+
+def _near(lon_deg: float, reference_deg: float) -> float:
+    """Return the longitude that lies within half a turn of another."""
+    return reference_deg + (lon_deg - reference_deg + 180.0) % 360.0 - 180.0

@@ -1,0 +1,142 @@
+"""The sidecar of a plan: everything that turning its log into a map needs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sparsor.errors import MissionError, ModelError
+from sparsor.geodesy.box import BoundingBox
+from sparsor.geodesy.grid import Grid
+from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_arrays, read_npz
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+FORMAT = "sparsor sidecar 1"
+
+
+@dataclass(frozen=True)
+class Sidecar:
+    """What a mission was planned with.
+
+    Parameters
+    ----------
+    name : str
+        Of the mission.
+    grid : Grid
+    allowed : array of bool (N,)
+        Cells inside the area.
+    model : Model
+    phi : array of bool (M, N)
+        The planned measurement matrix.
+    stops : array of int64 (n,)
+        Planned cells in flight order.
+    altitude_m, hold_s : float
+        Height above home and dwell time at each stop.
+    home : tuple of float
+        Longitude, latitude (degrees) and altitude above mean sea level (m) of home.
+    home_altitude_known : bool
+        Whether that altitude was given; otherwise it is written as 0.
+    lasso_weight : float
+        The lambda the plan was made with.
+    expected : mapping of str to float
+        What the search expects of the flight.
+    plans : mapping of str to str
+        Plan file name to the SHA-256 of what was written, so that later edits are seen.
+    """
+
+    name: str
+    grid: Grid
+    allowed: NDArray[np.bool_]
+    model: Model
+    phi: NDArray[np.bool_]
+    stops: NDArray[np.int64]
+    altitude_m: float
+    hold_s: float
+    home: tuple[float, float, float]
+    home_altitude_known: bool
+    lasso_weight: float
+    expected: Mapping[str, float]
+    plans: Mapping[str, str]
+
+
+def sidecar_npz(sidecar: Sidecar) -> bytes:
+    """Return the sidecar's file: plain arrays, never pickle."""
+    about = {
+        "format": FORMAT,
+        "name": sidecar.name,
+        "bbox": list(sidecar.grid.box.as_tuple()),
+        "shape": list(sidecar.grid.shape),
+        "altitude_m": sidecar.altitude_m,
+        "hold_s": sidecar.hold_s,
+        "home": list(sidecar.home),
+        "home_altitude_known": sidecar.home_altitude_known,
+        "lasso_weight": sidecar.lasso_weight,
+        "expected": dict(sidecar.expected),
+        "plans": dict(sidecar.plans),
+    }
+    return arrays_to_npz(
+        {
+            "sidecar": np.array(json.dumps(about, sort_keys=True)),
+            "allowed": sidecar.allowed,
+            "phi": sidecar.phi,
+            "stops": sidecar.stops,
+            **model_arrays(sidecar.model),
+        }
+    )
+
+
+def read_sidecar(path: Path) -> Sidecar:
+    """Read a sidecar.
+
+    Raises
+    ------
+    MissionError
+        When the file is missing, damaged or not a sidecar.
+    """
+    try:
+        arrays = read_npz(path)
+        about = json.loads(str(arrays["sidecar"]))
+        if about["format"] != FORMAT:
+            raise MissionError(f"'{path}' is a '{about['format']}'; this version reads '{FORMAT}'")
+        return _from_arrays(about, arrays, model_from_arrays(arrays, f"'{path}'"))
+    except ModelError as error:
+        raise MissionError(str(error)) from None
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise MissionError(f"'{path}' is not a sidecar of sparsor ({error}); plan the mission again") from error
+
+
+def content_hash(content: bytes) -> str:
+    """Return the SHA-256 that a sidecar remembers of a plan file."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], model: Model) -> Sidecar:
+    grid = Grid(BoundingBox(*(float(side) for side in about["bbox"])), (about["shape"][0], about["shape"][1]))
+    phi, stops, allowed = arrays["phi"], arrays["stops"].astype(np.int64), arrays["allowed"]
+    fits = phi.ndim == 2 and phi.shape[1] == allowed.size == grid.size
+    if not fits or stops.min(initial=0) < 0 or stops.max(initial=0) >= grid.size:
+        raise ValueError(f"its arrays do not fit a grid of {grid.shape[0]} x {grid.shape[1]}")
+    return Sidecar(
+        name=str(about["name"]),
+        grid=grid,
+        allowed=allowed.astype(np.bool_),
+        model=model,
+        phi=phi.astype(np.bool_),
+        stops=stops,
+        altitude_m=float(about["altitude_m"]),
+        hold_s=float(about["hold_s"]),
+        home=(float(about["home"][0]), float(about["home"][1]), float(about["home"][2])),
+        home_altitude_known=bool(about["home_altitude_known"]),
+        lasso_weight=float(about["lasso_weight"]),
+        expected={str(key): float(value) for key, value in about["expected"].items()},
+        plans={str(key): str(value) for key, value in about["plans"].items()},
+    )

@@ -1,0 +1,231 @@
+"""mission.toml: everything that was asked for, defaults filled in."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from sparsor.errors import MissionError
+
+Export = Literal["waypoints", "kml", "geojson"]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+Longitude = Annotated[FiniteFloat, Field(ge=-180, le=180)]
+Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
+
+HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
+PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
+DEFAULT_BUDGET = "10%"
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class AreaSection(_Section):
+    """Where: a box, or a file with a polygon."""
+
+    bbox: tuple[float, float, float, float] | None = None
+    file: Path | None = None
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.bbox is None) == (self.file is None):
+            raise ValueError("give either a bbox (west south east north) or an area file")
+        return self
+
+
+class PriorSection(_Section):
+    """What maps look like: a field, a model, or (neither) the built-in synthetic field."""
+
+    field: Path | None = None
+    variable: str | None = None
+    time: str | None = None
+    field_bbox: tuple[float, float, float, float] | None = None
+    field_colormap: str | None = None
+    field_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    model: Path | None = None
+    atoms: Annotated[int, Field(ge=2, le=4096)] | None = None
+
+    @model_validator(mode="after")
+    def _field_options(self) -> Self:
+        if self.field is not None and self.model is not None:
+            raise ValueError("give either a field to learn from or a model, not both")
+        of_field = ("variable", "time", "field_bbox", "field_colormap", "field_range")
+        given = [name for name in of_field if getattr(self, name) is not None]
+        if given and self.field is None:
+            raise ValueError(f"{', '.join(given)} need a field")
+        return self
+
+
+class SearchSection(_Section):
+    """Algorithm 1's settings; those left out are searched (p, theta) or chosen (lambdas)."""
+
+    planner: Literal["monte-carlo"] = "monte-carlo"
+    paper: bool = False
+    rows: Annotated[int, Field(ge=1, le=1024)] = 35
+    probability: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
+    theta: Annotated[int, Field(ge=0)] | None = None
+    lasso: Positive | None = None
+    lambda_valid: NotNegative = 1.0
+    lambda_path: NotNegative | None = None
+    lambda_incoh: NotNegative | None = None
+    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = 4000
+    time_s: Positive | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    budget: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill(cls, given: Any) -> Any:  # noqa: ANN401 (pydantic hands over whatever was given)
+        """Fill in what `--paper` and the missing budget imply, so that mission.toml states it."""
+        if not isinstance(given, dict):
+            return given
+        filled = {key: value for key, value in given.items() if value is not None}
+        both = "probability" in filled and "theta" in filled
+        no_default = filled.get("paper") or "lambda_path" in filled or both
+        if "budget" not in filled and no_default:
+            filled.setdefault("probability", PAPER_PROBABILITY)
+            filled.setdefault("theta", PAPER_THETA)
+        elif "budget" not in filled:
+            filled["budget"] = DEFAULT_BUDGET
+        return filled
+
+
+class FlightSection(_Section):
+    """What flies, how high, how fast, from where."""
+
+    vehicle: str = "quad"
+    autopilot: Literal["ardupilot", "px4"] = "ardupilot"
+    altitude_m: Positive = 50.0
+    speed_m_s: Positive | None = None
+    hold_s: NotNegative = 5.0
+    home: tuple[Longitude, Latitude] | None = None
+    home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
+    fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
+
+
+class OutputSection(_Section):
+    """Which files are written beside the plan."""
+
+    export: tuple[Export, ...] = ()
+
+
+class MissionSpecification(_Section):
+    """A mission as it was asked for."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    area: AreaSection
+    prior: PriorSection = PriorSection()
+    search: SearchSection = SearchSection()
+    flight: FlightSection = FlightSection()
+    output: OutputSection = OutputSection()
+
+
+def specification(data: dict[str, Any], *, base: Path) -> MissionSpecification:
+    """Check what was asked for.
+
+    Parameters
+    ----------
+    data : dict
+        The sections of mission.toml; keys whose value is None count as left out.
+    base : Path
+        Folder that relative paths start from.
+
+    Raises
+    ------
+    MissionError
+        Names each key that is wrong, its value and what is allowed.
+    """
+    try:
+        spec = MissionSpecification.model_validate(_without_none(data))
+    except ValidationError as error:
+        raise MissionError(_explain(error)) from None
+    return _with_paths(spec, lambda path: Path(os.path.normpath(base / path)))
+
+
+def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> MissionSpecification:
+    """Return a specification with what `data` gives in place of its own; a new area replaces the old.
+
+    Raises
+    ------
+    MissionError
+        As `specification` does.
+    """
+    merged = spec.model_dump(exclude_none=True)
+    for section, values in _without_none(data).items():
+        if section == "area" and values:
+            merged[section] = values
+        elif isinstance(values, dict):
+            merged[section] = {**merged.get(section, {}), **values}
+        else:
+            merged[section] = values
+    return specification(merged, base=base)
+
+
+def read_specification(path: Path) -> MissionSpecification:
+    """Read a mission.toml; paths in it start from its own folder.
+
+    Raises
+    ------
+    MissionError
+        When it cannot be read or something in it is wrong.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise MissionError(f"'{path}' cannot be read as a mission specification: {error}") from error
+    try:
+        return specification(data, base=path.absolute().parent)
+    except MissionError as error:
+        raise MissionError(f"'{path}': {error}") from None
+
+
+def specification_toml(spec: MissionSpecification, folder: Path) -> bytes:
+    """Return the mission.toml of a specification, with paths relative to the folder it will lie in."""
+
+    def relative(path: Path) -> Path:
+        try:
+            return Path(Path(os.path.relpath(path, folder.absolute())).as_posix())
+        except ValueError:  # another drive
+            return path
+
+    data = _with_paths(spec, relative).model_dump(mode="json", exclude_none=True)
+    return (HEADER + tomli_w.dumps(data)).encode()
+
+
+def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification:  # noqa: ANN401
+    def moved(section: Any, *names: str) -> Any:  # noqa: ANN401
+        paths = {name: change(getattr(section, name)) for name in names if getattr(section, name) is not None}
+        return section.model_copy(update=paths)
+
+    flight = spec.flight
+    if flight.vehicle.endswith(".toml"):
+        flight = flight.model_copy(update={"vehicle": change(Path(flight.vehicle)).as_posix()})
+    return spec.model_copy(
+        update={
+            "area": moved(spec.area, "file"),
+            "prior": moved(spec.prior, "field", "model"),
+            "flight": flight,
+        }
+    )
+
+
+def _without_none(data: dict[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in data.items() if value is not None}
+    return {key: _without_none(value) if isinstance(value, dict) else value for key, value in kept.items()}
+
+
+def _explain(error: ValidationError) -> str:
+    sentences = []
+    for fault in error.errors():
+        place = ".".join(str(part) for part in fault["loc"]) or "the specification"
+        reason = fault["msg"].removeprefix("Value error, ")
+        given = "" if isinstance(fault["input"], dict) else f", given {fault['input']!r}"
+        sentences.append(f"{place}: {reason}{given}")
+    return "; ".join(dict.fromkeys(sentences))

@@ -1,0 +1,82 @@
+"""The legend's entries: what is on the map, drawn as it is there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sparsor.plot import style
+from sparsor.plot.route import HOUSE, numbered_stops
+from sparsor.plot.scales import length_label
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+
+    from sparsor.plot.picture import MissionPicture
+    from sparsor.plot.view import View
+
+    Handle = Artist | tuple[Artist, ...]
+
+SAME_PLACE_IN = 0.02
+WINDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+
+
+def legend_entries(view: View, picture: MissionPicture, *, coast: bool) -> tuple[list[Handle], list[str]]:
+    """Return handles and labels of everything that the map of a picture shows."""
+    from matplotlib.patches import Patch
+
+    entries: list[tuple[Handle, str]] = []
+    if picture.route is not None:
+        entries.append((_line(style.ROUTE_CASING, style.ROUTE), "route"))
+    if picture.stops is not None:
+        entries.append((_line(style.NUMBERED_STOP), _stops_label(view, picture)))
+    if picture.transits:
+        entries.append((_line(style.TRANSIT), "from and to home"))
+    if picture.home is not None:
+        entries.append((_home_handle(), _home_label(view, picture)))
+    if picture.fence is not None:
+        entries.append((_line(style.FENCE), "fence"))
+    if picture.area:
+        entries.append((_line(style.AREA), "area"))
+    if picture.outside is not None and picture.outside.any():
+        entries.append((Patch(facecolor=style.GREYED_OUT, edgecolor=style.FAINT_INK, linewidth=0.4), "not flown"))
+    if coast:
+        entries.append((_line({**style.COAST, "linewidth": 0.75}), "coastline (GSHHG)"))
+    return [handle for handle, _ in entries], [label for _, label in entries]
+
+
+def _line(*layers: style.Style) -> Handle:
+    from matplotlib.lines import Line2D
+
+    return tuple(Line2D([], [], **layer) for layer in layers)  # drawn one over the other
+
+
+def _home_handle() -> Artist:
+    from matplotlib.lines import Line2D
+    from matplotlib.markers import MarkerStyle
+    from matplotlib.path import Path
+
+    return Line2D([], [], linestyle="none", marker=MarkerStyle(Path(HOUSE)), **style.HOME)
+
+
+def _stops_label(view: View, picture: MissionPicture) -> str:
+    count = 0 if picture.stops is None else len(picture.stops)
+    every = picture.stops is None or len(numbered_stops(view.inches(picture.stops))) == count
+    return f"{count} stops, in order" if every else f"{count} stops, some numbered"
+
+
+def _home_label(view: View, picture: MissionPicture) -> str:
+    """Say where home is when its symbol does not: at a stop, or off the map."""
+    home = np.array([picture.home], dtype=np.float64)
+    place = view.inches(home)[0]
+    if picture.stops is not None and len(picture.stops):
+        apart = np.hypot(*(view.inches(picture.stops) - place).T)
+        if apart.min() < SAME_PLACE_IN:
+            return f"home, at stop {int(apart.argmin()) + 1}"
+    if view.shows(home)[0]:
+        return "home"
+    east, north = place - np.array([view.width_in, view.height_in]) / 2
+    length_m = float(np.hypot(east, north)) * view.m_per_inch
+    wind = WINDS[round(float(np.degrees(np.arctan2(east, north))) / 45) % 8]
+    return f"home: {length_label(float(f'{length_m:.2g}'))} {wind}, off the map"

@@ -1,0 +1,88 @@
+"""The picture of a mission, for a report: the map it expects, the route over it, and where that is."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+from sparsor.plot import furniture, ground, style
+from sparsor.plot.layout import DPI, WIDTH_IN, layout_of
+from sparsor.plot.legend import legend_entries
+from sparsor.plot.route import draw_home, draw_route, draw_stops, draw_transit
+from sparsor.plot.view import view_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sparsor.plot.layout import Layout
+    from sparsor.plot.picture import MissionPicture
+    from sparsor.plot.view import View
+
+
+def mission_preview(picture: MissionPicture) -> bytes:
+    """Draw a mission; the same picture gives the same bytes.
+
+    Parameters
+    ----------
+    picture : MissionPicture
+        What is drawn.
+
+    Returns
+    -------
+    bytes
+        A PNG, 1400 pixels wide and about 1200 high.
+    """
+    from matplotlib import style as matplotlib_style
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    view = view_of(picture)
+    layout = layout_of(picture, view)
+    with matplotlib_style.context("default"):  # whatever the user's own settings are
+        figure = Figure(figsize=(WIDTH_IN, layout.height_in), dpi=DPI, facecolor="white")
+        _draw(figure, layout, view, picture)
+        stream = io.BytesIO()
+        FigureCanvasAgg(figure)
+        figure.savefig(stream, format="png", metadata={"Software": "sparsor", "Title": picture.title})
+    return stream.getvalue()
+
+
+def _draw(figure: Figure, layout: Layout, view: View, picture: MissionPicture) -> None:
+    axes = _map_axes(figure, layout, view)
+    prior = ground.draw_prior(axes, view, picture)
+    ground.draw_outside(axes, view, picture)
+    ground.draw_cells(axes, view, picture)
+    coast = ground.draw_coast(axes, view)
+    ground.draw_outlines(axes, view, picture)
+    _draw_flight(axes, view, picture)
+    furniture.draw_graticule(axes, view)
+    furniture.draw_north_and_scale(figure, layout, view)
+    handles, labels = legend_entries(view, picture, coast=coast)
+    furniture.draw_legend(figure, layout, handles, labels)
+    if prior is not None:
+        furniture.draw_colour_bar(figure, layout, prior, layout.colour_bar_in(len(labels)))
+    furniture.draw_words(figure, layout)
+    # imshow and plot move the limits; the view decides.
+    axes.set(xlim=(view.west_deg, view.east_deg), ylim=(view.south_deg, view.north_deg))
+
+
+def _map_axes(figure: Figure, layout: Layout, view: View) -> Axes:
+    axes = layout.axes_in(figure, layout.map_left_in, layout.map_bottom_in, layout.map_width_in, layout.map_height_in)
+    axes.axis("on")
+    axes.set_facecolor(style.PAPER)
+    axes.set(xlim=(view.west_deg, view.east_deg), ylim=(view.south_deg, view.north_deg))
+    for edge in axes.spines.values():
+        edge.set(linewidth=0.6, color=style.INK)
+    return axes
+
+
+def _draw_flight(axes: Axes, view: View, picture: MissionPicture) -> None:
+    for transit in picture.transits:
+        draw_transit(axes, view, transit)
+    if picture.route is not None and len(picture.route):
+        draw_route(axes, view, picture.route)
+    if picture.stops is not None and len(picture.stops):
+        draw_stops(axes, view, picture.stops)
+    if picture.home is not None:
+        draw_home(axes, view, picture, picture.home)

@@ -1,0 +1,99 @@
+"""Second-order statistics of maps: covariance factor, variogram and its exponential kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sparsor.errors import ModelError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_MAX_RANK = 64
+_LARGEST_LAG = 0.5  # of the shorter side: beyond it a variogram rests on too few pairs
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A stationary exponential covariance ``variance exp(-d / length)`` plus a nugget at distance 0.
+
+    Parameters
+    ----------
+    variance, nugget : float
+        On the square of the 0..1 scale.
+    length_cells : float
+        Decay length, cells.
+    """
+
+    variance: float
+    length_cells: float
+    nugget: float
+
+    def __post_init__(self) -> None:
+        values = (self.variance, self.length_cells, self.nugget)
+        if not (np.isfinite(values).all() and self.variance > 0 and self.length_cells > 0 and self.nugget >= 0):
+            raise ModelError(f"{self} is not a kernel: variance and length have to be above 0, the nugget 0 or above")
+
+
+def covariance_factor(maps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return F, (N, R) with R <= 64, so that ``F F^T`` is the maps' covariance in its leading components.
+
+    Parameters
+    ----------
+    maps : array of float64 (n, N)
+    """
+    centred = maps - maps.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred, full_matrices=False)
+    rank = min(_MAX_RANK, len(maps) - 1)
+    return np.ascontiguousarray(axes[:rank].T * (spread[:rank] / np.sqrt(len(maps) - 1)))
+
+
+def variogram(maps: NDArray[np.float64], shape: tuple[int, int], lags: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return half the mean squared difference between cells `lags` apart along rows and columns.
+
+    Parameters
+    ----------
+    maps : array of float64 (n, N)
+    shape : tuple of int
+        Rows and columns of a map.
+    lags : array of int64 (m,)
+        Cells, 1 to the shorter side less 1.
+
+    Returns
+    -------
+    array of float64 (m,)
+        In the square of the maps' unit.
+    """
+    cube = maps.reshape(-1, *shape)
+    half = [
+        (np.square(cube[:, lag:] - cube[:, :-lag]).mean() + np.square(cube[:, :, lag:] - cube[:, :, :-lag]).mean()) / 4
+        for lag in lags.tolist()
+    ]
+    return np.array(half)
+
+
+def fit_kernel(maps: NDArray[np.float64], shape: tuple[int, int]) -> Kernel:
+    """Fit the exponential kernel to the variogram of maps by weighted least squares.
+
+    Raises
+    ------
+    ModelError
+        When the maps have no contrast.
+    """
+    from scipy.optimize import nnls
+
+    lags = np.arange(1, max(3, int(_LARGEST_LAG * min(shape)) + 1))
+    measured = variogram(maps, shape, lags)
+    if not measured.max() > 0:
+        raise ModelError("the training maps have no contrast: no kernel can be fitted to them")
+    best = (np.inf, 1.0, np.array([1.0, 0.0]))
+    for length in np.geomspace(0.5, 8.0 * max(shape), 60):
+        # Weighted by 1/gamma^2 (Cressie 1985), so that the short lags, which kriging leans on, count.
+        columns = np.stack([1 - np.exp(-lags / length), np.ones(lags.size)], axis=1) / measured[:, None]
+        weights, misfit = nnls(columns, np.ones(lags.size))
+        if weights[0] > 0 and misfit < best[0]:
+            best = (misfit, float(length), weights)
+    return Kernel(float(best[2][0]), best[1], float(best[2][1]))

@@ -1,0 +1,151 @@
+"""Vehicle profiles: what a vehicle can do, read from TOML and checked once."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sparsor.errors import VehicleError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pydantic_core import ErrorDetails
+
+# MAV_TYPE of each kind (MAVLink common.xml). A new kind is an entry here and in `Kind`, a packaged profile,
+# and its own sequence of items in mission.
+MAV_TYPES = {"quad": 2}
+Kind = Literal["quad"]
+
+Speed = Annotated[float, Field(gt=0, le=200, allow_inf_nan=False)]
+
+
+class Vehicle(BaseModel):
+    """What a vehicle can do; every value in the unit of its name.
+
+    Build one with `load_vehicle` or `Vehicle.from_mapping`, whose errors are sentences.
+
+    Parameters
+    ----------
+    name : str
+        What the profile is called.
+    kind : str
+        Decides the flight items: ``"quad"``, any multirotor that hovers.
+    cruise_m_s, climb_m_s, descent_m_s : float
+        Along a leg, up, and down to `touchdown_height_m`.
+    touchdown_m_s, touchdown_height_m : float
+        Speed of the last part of the landing, and the height above home at which it begins.
+    acceleration_m_s2 : float
+        Of speeding up and of braking along a leg.
+    endurance_s, reserve_fraction : float
+        Time from full to empty, and the share of it that is never planned for.
+    ceiling_m : float
+        Height above home beyond which a mission is warned about. No claim of compliance.
+    acceptance_radius_m : float
+        How near to a waypoint counts as reached.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    kind: Kind
+    cruise_m_s: Speed
+    climb_m_s: Speed
+    descent_m_s: Speed
+    touchdown_m_s: Speed = 0.5
+    touchdown_height_m: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 10.0
+    acceleration_m_s2: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+    endurance_s: Annotated[float, Field(gt=0, le=1e7, allow_inf_nan=False)]
+    reserve_fraction: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] = 0.2
+    ceiling_m: Annotated[float, Field(gt=0, le=20_000, allow_inf_nan=False)] = 120.0
+    acceptance_radius_m: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 2.0
+
+    @property
+    def mav_type(self) -> int:
+        """MAV_TYPE of this kind of vehicle."""
+        return MAV_TYPES[self.kind]
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, object], source: str) -> Vehicle:
+        """Check the values of a profile.
+
+        Parameters
+        ----------
+        values : mapping
+            As TOML gives them.
+        source : str
+            Named in the errors.
+
+        Raises
+        ------
+        VehicleError
+            When a key is unknown or missing or a value is not allowed; names the first of them.
+        """
+        try:
+            return cls.model_validate(dict(values))
+        except ValidationError as error:
+            raise VehicleError(_sentence(error.errors()[0], source, list(cls.model_fields))) from error
+
+
+def packaged_vehicles() -> list[str]:
+    """Return the names of the profiles that come with sparsor, sorted."""
+    folder = resources.files("sparsor.vehicle") / "profiles"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_vehicle(name_or_path: str | Path) -> Vehicle:
+    """Return a packaged vehicle by name, or the one that a .toml file describes.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        ``"quad"``, or a path that ends in ``.toml``.
+
+    Raises
+    ------
+    VehicleError
+        When the name is unknown, the file cannot be read, or a value in it is not allowed.
+
+    Examples
+    --------
+    >>> load_vehicle("quad").cruise_m_s
+    10.0
+    """
+    text = str(name_or_path)
+    if text.lower().endswith(".toml"):
+        return _parse(_read(Path(text)), f"the vehicle profile '{text}'")
+    if text in packaged_vehicles():
+        packaged = resources.files("sparsor.vehicle") / "profiles" / f"{text}.toml"
+        return _parse(packaged.read_bytes(), f"the packaged profile '{text}'")
+    raise VehicleError(
+        f"unknown vehicle '{text}'; known are {', '.join(packaged_vehicles())}, or give the path of a .toml file"
+    )
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise VehicleError(f"cannot read the vehicle profile '{path}': {error.strerror or error}") from error
+
+
+def _parse(content: bytes, source: str) -> Vehicle:
+    try:
+        values = tomllib.loads(content.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise VehicleError(f"{source} is not TOML: {error}") from error
+    return Vehicle.from_mapping(values, source)
+
+
+def _sentence(error: ErrorDetails, source: str, keys: list[str]) -> str:
+    key = ".".join(str(part) for part in error["loc"])
+    if error["type"] == "extra_forbidden":
+        return f"{source}: unknown key '{key}'; known are {', '.join(keys)}"
+    if error["type"] == "missing":
+        return f"{source}: the key '{key}' is missing"
+    allowed = error["msg"][0].lower() + error["msg"][1:]
+    return f"{source}: {key} = {error['input']!r} is not allowed: {allowed}"
