@@ -26,10 +26,7 @@ def boxes(draw: st.DrawFn, *, across: bool = False) -> BoundingBox:
     scale = math.cos(math.radians(south + height_deg / 2))
     width_deg = draw(sides_m()) / (EQUATOR_M_PER_DEG * scale)
     assume(width_deg < 179.0)
-    if across:
-        west = 180.0 - width_deg * draw(st.floats(0.01, 0.99))
-    else:
-        west = draw(st.floats(-180.0, 180.0 - 1e-9))
+    west = 180.0 - width_deg * draw(st.floats(0.01, 0.99)) if across else draw(st.floats(-180.0, 180.0 - 1e-9))
     east = west + width_deg
     return BoundingBox(west, south, east - 360.0 if east > 180.0 else east, south + height_deg)
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import rasterio
 from rasterio.transform import from_origin
+from threadpoolctl import threadpool_limits
 
 from sparsor.cli.main import generate_mission
 from sparsor.core.metrics import centred_relative_error
@@ -62,7 +63,7 @@ def field_file(folder):
 
 def run(monkeypatch, capsys, *words):
     monkeypatch.setattr(sys, "argv", ["generate-mission", *map(str, words)])
-    with pytest.raises(SystemExit) as end:
+    with threadpool_limits(1), pytest.raises(SystemExit) as end:  # beside other test processes
         generate_mission()
     captured = capsys.readouterr()
     assert end.value.code == 0, captured.err

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 import rasterio
 from rasterio.transform import from_origin
+from threadpoolctl import threadpool_limits
 
 from sparsor.cli import main
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 COMMANDS = {"sparsor": main.main, "generate-mission": main.generate_mission}
@@ -71,6 +73,13 @@ def console(
     monkeypatch.setenv("SPARSOR_CACHE_DIR", str(cache))
     monkeypatch.setenv("COLUMNS", "240")
     return Console(monkeypatch, capsys)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_blas_thread() -> Iterator[None]:
+    """Several test processes, each with a thread a core that spins, are slower than one thread each."""
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture

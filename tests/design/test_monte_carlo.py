@@ -103,7 +103,7 @@ def test_error_counts_allowed_cells_only(problem):
 
 
 def test_a_budget_nobody_meets_names_the_shortest_found(problem):
-    with pytest.raises(BudgetError, match=r"no route within 1 m among 40 samples: the shortest found takes \d+ m"):
+    with pytest.raises(BudgetError, match=r"no route within 1 m among 40 samples: the shortest found is \d+ m"):
         search(
             replace(problem, budget=Budget(0.5 + 0.5, "distance")),
             fixed_sparsity(P, THETA),

@@ -33,7 +33,7 @@ def test_the_description_is_in_words() -> None:
     text = "\n".join(said.lines)
     assert "Plan for PX4, quadrotor" in text
     assert "12 m above sea level" in text
-    assert "Stops 50 to 50 m above home" in text
+    assert "Stops 50 m above home" in text
 
 
 def test_an_unknown_altitude_is_called_so() -> None:

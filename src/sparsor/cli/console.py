@@ -55,7 +55,7 @@ def reporting(command: Callable[P, R]) -> Callable[P, R]:
         try:
             return command(*args, **kwargs)
         except KeyboardInterrupt:
-            typer.echo("interrupted: nothing was written", err=True)
+            typer.echo("interrupted: what was there before is still there", err=True)
             raise typer.Exit(INTERRUPTED) from None
         except (SparsorError, OSError, MemoryError) as error:
             if kwargs.get("verbose"):

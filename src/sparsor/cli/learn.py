@@ -117,11 +117,7 @@ def learn(
                 f"{model.provenance['dictionary']}, {model.atoms} atoms, "
                 f"{'centred' if model.centred else 'uncentred'}; lambda {model.lasso_weight:g}",
             ),
-            (
-                "kernel",
-                f"exponential, decay over {model.kernel.length_cells:.1f} cells, nugget "
-                f"{model.kernel.nugget / (model.kernel.nugget + model.kernel.variance):.1%} of the sill",
-            ),
+            ("kernel", model.kernel.words),
             (
                 "validation maps",
                 f"represented with a relative error of {learned.validation_relative_error:.3f} "

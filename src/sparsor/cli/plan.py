@@ -138,7 +138,12 @@ def plan(
     iterations: Annotated[int | None, _option(SEARCH, "Monte-Carlo samples (default: 4000).", "--iterations")] = None,
     time: Annotated[
         float | None,
-        _option(SEARCH, "Go on for this long; the plan then depends on the machine.", "--time", metavar="SECONDS"),
+        _option(
+            SEARCH,
+            "Search on until this has passed; the plan then depends on the machine.",
+            "--time",
+            metavar="SECONDS",
+        ),
     ] = None,
     seed: Annotated[int | None, _option(SEARCH, "Seed of the search (default: 0).", "--seed")] = None,
     workers: Annotated[
@@ -265,8 +270,19 @@ def _request(
         BoundingBox(*box)  # its errors say more than the specification's
     if given["name"] is None:
         given["name"] = output.name if output is not None else _default_name(box, area)
-    spec = specification(given, base=Path.cwd())
+    try:
+        spec = specification(given, base=Path.cwd())
+    except MissionError as error:
+        raise MissionError(_as_typed(str(error))) from None
     return spec, output or Path("missions") / spec.name
+
+
+def _as_typed(message: str) -> str:
+    """Return a message about keys of mission.toml as one about the options that were typed for them."""
+    message = message.replace("search.time_s", "--time")
+    message = re.sub(r"\b(?:search|flight|prior|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
+    message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
+    return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)
 
 
 def _default_name(box: Box | None, area: Path | None) -> str:

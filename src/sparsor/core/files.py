@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import signal
 import tempfile
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sparsor.errors import OutputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
 
 def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
@@ -33,16 +37,20 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     OutputError
         When the folder or a file cannot be written.
     """
-    made = _missing_folders(folder)
+    made: list[Path] = []
     written: list[tuple[Path, Path]] = []
     try:
+        made = _missing_folders(folder)
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in contents.items():
             target = folder / name
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"'{name}' is a folder")
             temporary = _write_temporary(target, content)
             written.append((temporary, target))
-        for temporary, target in written:
-            temporary.replace(target)
+        with _uninterrupted():
+            for temporary, target in written:
+                temporary.replace(target)
     except OSError as error:
         raise OutputError(
             f"cannot write to '{folder}': {error.strerror or error}. Free some space or choose another folder with -o."
@@ -84,6 +92,27 @@ def _write_temporary(target: Path, content: bytes) -> Path:
         temporary.unlink(missing_ok=True)
         raise
     return temporary
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hold back Ctrl-C for the moment in which some files would be new and others old."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed = False
+
+    def remember(_number: int, _frame: object) -> None:
+        nonlocal pressed
+        pressed = True
+
+    before = signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 def _umask() -> int:

@@ -40,7 +40,9 @@ def centred_relative_error(truth: NDArray[np.float64], estimate: NDArray[np.floa
     """
     spread = np.linalg.norm(truth - truth.mean(axis=1, keepdims=True), axis=1)
     error = np.linalg.norm(truth - estimate, axis=1)
-    return np.asarray(np.divide(error, spread, out=np.full(spread.shape, np.nan), where=spread > 0))
+    # The mean of equal values is rounded: what is left of them then is no contrast.
+    contrast = np.ptp(truth, axis=1) > 0
+    return np.asarray(np.divide(error, spread, out=np.full(spread.shape, np.nan), where=contrast))
 
 
 def rmse(truth: NDArray[np.float64], estimate: NDArray[np.float64]) -> float:

@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import count
 from threading import Lock
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002
@@ -27,7 +28,11 @@ from sparsor.design.route import shortest_path
 from sparsor.design.sensing import draw_phi, incoherence, measured_atoms
 from sparsor.errors import BudgetError, DesignError
 
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
 _BLOCK = 16  # samples handed to a worker at a time
+_SLICE = 256  # blocks that wait for a worker
 # Skipping has to be exact: a candidate is given up only when it is worse by more than rounding.
 _SLACK = 1.0 + 1e-9
 
@@ -186,13 +191,14 @@ def search(
         return last
 
     blocks = range(-(-iterations // _BLOCK))
-    # One BLAS thread a worker: the same sums in the same order, whatever the number of cores.
-    with threadpool_limits(1), ThreadPoolExecutor(workers) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
         try:
-            for done in pool.map(run, blocks):
-                progress("searching", min(done, iterations), iterations)
+            deadline = time.monotonic() + (seconds or 0.0)
+            for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
+                for done in pool.map(run, blocks[first : first + _SLICE]):
+                    progress("searching", min(done, iterations), iterations)
             if seconds is not None:
-                _continue_until(time.monotonic() + seconds, pool, run, len(blocks), workers)
+                _continue_until(deadline, pool, run, len(blocks), workers)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -204,9 +210,13 @@ def evaluate(
 ) -> Candidate | None:
     """Evaluate the one sample drawn from `rng`; None when it visits under two cells or breaks the budget."""
     best = _Best()
-    with threadpool_limits(1):
-        _try_draw(problem, sparsity, weights, rng, sample, best)
+    _try_draw(problem, sparsity, weights, rng, sample, best)
     return best.candidate
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Return the context in which sums come out the same on any number of cores: one BLAS thread a worker."""
+    return cast("AbstractContextManager[object]", threadpool_limits(1))
 
 
 def fixed_sparsity(probability: float, theta: int) -> Sparsity:
@@ -274,6 +284,6 @@ def _winner(problem: Problem, best: _Best, iterations: int) -> Candidate:
         say = problem.budget.describe
         raise BudgetError(
             f"no route within {say(problem.budget.limit)} among {iterations} samples: the shortest found "
-            f"takes {say(best.shortest)}. Allow a larger --budget or more --iterations."
+            f"is {say(best.shortest)}. Allow a larger --budget or more --iterations."
         )
     raise DesignError(f"none of {iterations} samples visits two cells: raise --probability or lower --theta")

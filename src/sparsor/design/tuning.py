@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.core.streams import stream
-from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity
+from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity, one_blas_thread
 from sparsor.errors import DesignError
 
 if TYPE_CHECKING:
@@ -45,11 +45,12 @@ def choose_lasso_weight(
     scores = []
     for weight in LASSO_WEIGHTS:
         problem = Problem(psi, maps, weight, legs, rows, improve=False)
-        drawn = [
-            evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
-            for kind in kinds
-            for draw in range(_TUNING_DRAWS)
-        ]
+        with one_blas_thread():
+            drawn = [
+                evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
+                for kind in kinds
+                for draw in range(_TUNING_DRAWS)
+            ]
         # Each kind of Phi counts the same, whatever the size of its error: hence the logarithm.
         scores.append(np.mean([np.log(max(one.error, 1e-300)) for one in drawn if one is not None] or [0.0]))
     return LASSO_WEIGHTS[int(np.argmin(scores))]
@@ -64,7 +65,8 @@ def pilot(problem: Problem, sparsity: Sparsity, *, seed: int) -> list[Candidate]
         When not one visits two cells.
     """
     free = replace(problem, budget=None)
-    drawn = [evaluate(free, sparsity, Weights(), rng=stream(seed, draw, _PILOT)) for draw in range(_PILOT_DRAWS)]
+    with one_blas_thread():
+        drawn = [evaluate(free, sparsity, Weights(), rng=stream(seed, draw, _PILOT)) for draw in range(_PILOT_DRAWS)]
     found = [one for one in drawn if one is not None]
     if not found:
         raise DesignError(f"none of {_PILOT_DRAWS} samples visits two cells: raise --probability or lower --theta")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sparsor.errors import AreaError
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import Geod
@@ -78,10 +80,14 @@ def to_wgs84(x: ArrayLike, y: ArrayLike, crs: str) -> tuple[NDArray[np.float64],
 
     Raises
     ------
-    pyproj.exceptions.CRSError
+    AreaError
         When `crs` is not understood.
     """
     from pyproj import Transformer
+    from pyproj.exceptions import CRSError
 
-    lon, lat = Transformer.from_crs(crs, "EPSG:4326", always_xy=True).transform(x, y)
+    try:
+        lon, lat = Transformer.from_crs(crs, "EPSG:4326", always_xy=True).transform(x, y)
+    except CRSError as error:
+        raise AreaError(f"the reference system is not understood ({error})") from error
     return np.asarray(lon, dtype=np.float64), np.asarray(lat, dtype=np.float64)

@@ -108,7 +108,6 @@ def _simple_parts(geometry: BaseGeometry) -> Iterator[BaseGeometry]:
 
 def _in_wgs84(path: Path, polygon: Polygon, crs: str | None) -> Polygon:
     import shapely
-    from pyproj.exceptions import CRSError
 
     if crs in DEGREES:
         return polygon
@@ -121,5 +120,5 @@ def _in_wgs84(path: Path, polygon: Polygon, crs: str | None) -> Polygon:
 
     try:
         return shapely.transform(dense, degrees)
-    except CRSError as error:
-        raise AreaError(f"'{path}' is in a reference system that is not understood ({error})") from error
+    except AreaError as error:
+        raise AreaError(f"'{path}': {error}") from error

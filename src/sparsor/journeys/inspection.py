@@ -106,7 +106,7 @@ def _model_lines(model: Model) -> list[str]:
         f"Dictionary: {model.provenance.get('dictionary', 'learned')}, {model.atoms} atoms, "
         f"{'centred' if model.centred else 'uncentred'}; lambda {model.lasso_weight:g}.",
         f"Scale: 0..1 is {model.scale[0]:.4g}..{model.scale[1]:.4g} {model.unit}.",
-        f"Kernel: exponential, decay over {model.kernel.length_cells:.1f} cells.",
+        f"Kernel: {model.kernel.words}.",
         f"{len(model.validation)} validation maps. From: {model.provenance.get('source', 'unknown')}.",
     ]
 

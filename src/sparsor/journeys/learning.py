@@ -9,7 +9,7 @@ from sparsor.core.files import write_file
 from sparsor.core.progress import Progress, silent
 from sparsor.errors import FieldError, ModelError
 from sparsor.geodesy import BoundingBox
-from sparsor.journeys.modelling import learn_model, representation_error
+from sparsor.journeys.modelling import learn_model, representation_error, with_sources
 from sparsor.prior.builtin import SHAPE
 from sparsor.prior.dictionary import DictionaryName
 from sparsor.prior.learning import DEFAULT_ATOMS, split_maps
@@ -111,7 +111,7 @@ def learn_from_fields(request: LearnRequest, output: Path, *, progress: Progress
         seed=request.seed,
         progress=progress,
     )
-    content = arrays_to_npz(model_arrays(model))
+    content = arrays_to_npz(model_arrays(with_sources(model, dict(zip(request.fields, fields, strict=True)))))
     write_file(output, content)
     model = model_from_npz(content, f"'{output}'")
     return LearnedModel(

@@ -22,6 +22,7 @@ from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, split_maps, untu
 from sparsor.prior.mismatch import mismatch_factor
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz, read_model
 from sparsor.prior.reading import read_field
+from sparsor.prior.synthetic import covers
 from sparsor.prior.windows import ground_windows, nearest_resolved_m
 
 if TYPE_CHECKING:
@@ -120,6 +121,14 @@ def representation_error(model: Model) -> float:
     return float(centred_relative_error(model.validation, coded @ model.dictionary.T + model.mean).mean())
 
 
+def with_sources(model: Model, fields: Mapping[Path, Field]) -> Model:
+    """Return a model that names the files it was learned from: by name and contents, not by where they lay."""
+    names = [
+        f"{field.source.replace(str(path), path.name)}, sha256 {sha256_of(path)[:16]}" for path, field in fields.items()
+    ]
+    return replace(model, provenance={**model.provenance, "source": "; ".join(names)})
+
+
 def cache_folder() -> Path:
     """Return the folder for models learned on the way: ``SPARSOR_CACHE_DIR``, else the user's cache."""
     if given := os.environ.get("SPARSOR_CACHE_DIR"):
@@ -157,6 +166,11 @@ def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) 
         key = {"built-in": side, "atoms": atoms, "centred": not paper}
         model = _cached(key, lambda: learn_model(builtin_maps(side), atoms=atoms, centred=not paper, progress=progress))
     warnings = ["The prior is the built-in synthetic Gulf NO2 field, not a measurement: give --field or --model."]
+    if not covers(box.as_tuple()):
+        warnings.append(
+            f"The built-in field is the Gulf's, the box lies at {box.centre_lon_deg:.4g} E, {box.centre_lat_deg:.4g} N "
+            "(are longitude and latitude swapped? The order is west south east north)."
+        )
     size = (box.east_m * box.north_m) ** 0.5
     widening = mismatch_factor(max(side / size, size / side))
     if not SIDES_M[0] / _BETWEEN_SIDES <= size <= SIDES_M[-1] * _BETWEEN_SIDES:
@@ -193,8 +207,7 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
         return learn_model(maps, atoms=atoms, centred=not paper, progress=progress)
 
     model = _cached(key, learn)
-    # The cache knows a field by its contents: the file it was first read from may have had another name.
-    model = replace(model, provenance={**model.provenance, "source": field.source})
+    model = with_sources(model, {request.field: field})
     widening, said = _size_difference(model, box)
     notes = [*field.notes, *said]
     if model.atoms < atoms:

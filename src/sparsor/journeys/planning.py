@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 SPECIFICATION_FILE = "mission.toml"
 PREVIEW_FILE = "preview.png"
 _HARDLY_BETTER = 0.9
+_FAR_HOME = 3.0  # diagonals of the box
 
 
 @dataclass(frozen=True)
@@ -152,8 +154,8 @@ def plan_mission(
 def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True) -> dict[str, Path]:
     """Write a mission's folder, all of its files or none; return what is where.
 
-    Exports of an earlier mission of the same name that this one does not make are removed, so that no old
-    route lies beside the new one.
+    Plans, sidecar and exports of the mission that was there before and that this one does not make are removed,
+    so that no old route lies beside the new one.
 
     Raises
     ------
@@ -171,10 +173,10 @@ def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True
         from sparsor.journeys.preview import preview_png
 
         contents[PREVIEW_FILE] = preview_png(mission)
+    stale = _files_before(folder, name) - contents.keys()
     write_files(folder, contents)
-    for stale in (folder / f"{name}.{export}" for export in FORMATS):
-        if stale.name not in contents:
-            stale.unlink(missing_ok=True)
+    for file in stale:
+        (folder / file).unlink(missing_ok=True)
     return {file: folder / file for file in contents}
 
 
@@ -200,6 +202,14 @@ def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> No
     raise MissionError(
         f"'{folder}' holds something else already: choose another --name or -o, or write over it with --force"
     )
+
+
+def _files_before(folder: Path, name: str) -> set[str]:
+    """Return the names of what an earlier mission in a folder consists of, beside specification and picture."""
+    names = {name}
+    with suppress(MissionError):
+        names.add(read_specification(folder / SPECIFICATION_FILE).name)
+    return {f"{name}.{suffix}" for name in names for suffix in ("plan", "npz", *FORMATS)}
 
 
 def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
@@ -338,7 +348,13 @@ def _assemble(
         expected_relative_error_cells=cells * prior.widening,
         warnings=(),
     )
-    said = (*_what_would_fly(mission), *_what_would_help(mission), *plan.warnings, *prior.warnings)
+    said = (
+        *_what_would_fly(mission),
+        *_what_would_help(mission),
+        *_far_home(mission),
+        *plan.warnings,
+        *prior.warnings,
+    )
     return replace(mission, warnings=said)
 
 
@@ -373,6 +389,18 @@ def _what_would_help(mission: PlannedMission) -> tuple[str, ...]:
         "knowing the map's mean (1): allow a larger --budget, or learn the prior from more or larger fields."
     )
     return (sentence,)
+
+
+def _far_home(mission: PlannedMission) -> tuple[str, ...]:
+    """Return the sentence for a home that lies so far away that it may be a slip; none for others."""
+    box, home = mission.place.grid.box, mission.plan.home
+    away_m = float(distance_m(home.lon_deg, home.lat_deg, box.centre_lon_deg, box.centre_lat_deg))
+    if away_m < _FAR_HOME * np.hypot(box.east_m, box.north_m):
+        return ()
+    return (
+        f"Home, {home.lon_deg:g} {home.lat_deg:g}, lies {away_m / 1000:.0f} km from the middle of the box: are "
+        "longitude and latitude swapped? The order is longitude, latitude.",
+    )
 
 
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:

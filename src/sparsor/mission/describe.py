@@ -91,7 +91,10 @@ class PlanDescription:
             f"Home to first stop {self.home_to_first_m:.0f} m, last stop to home {self.last_to_home_m:.0f} m",
             f"Holds {self.hold_s:g} s in all",
         ]
-        lines += [f"Stops {low:g} to {high:g} m above {what}" for what, (low, high) in self.altitudes_m.items()]
+        lines += [
+            f"Stops {low:g} m above {what}" if low == high else f"Stops {low:g} to {high:g} m above {what}"
+            for what, (low, high) in self.altitudes_m.items()
+        ]
         if self.speeds_m_s:
             lines.append("Speed " + ", ".join(f"{speed:g}" for speed in self.speeds_m_s) + " m/s")
         lines.append(f"Fence of {self.fence_points} points and {self.fence_circles} circles")

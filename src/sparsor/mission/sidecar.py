@@ -110,7 +110,7 @@ def read_sidecar(path: Path) -> Sidecar:
         return _from_arrays(about, arrays, model_from_arrays(arrays, f"'{path}'"))
     except ModelError as error:
         raise MissionError(str(error)) from None
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise MissionError(f"'{path}' is not a sidecar of sparsor ({error}); plan the mission again") from error
 
 

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from sparsor.errors import MissionError
 
@@ -21,6 +30,7 @@ Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
 HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
 PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
 DEFAULT_BUDGET = "10%"
+_NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 
 
 class _Section(BaseModel):
@@ -80,6 +90,15 @@ class SearchSection(_Section):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     budget: str | None = None
 
+    @field_validator("budget")
+    @classmethod
+    def _readable(cls, budget: str | None) -> str | None:
+        from sparsor.design.budget import parse_budget
+
+        if budget is not None:
+            parse_budget(budget)
+        return budget
+
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, given: Any) -> Any:  # noqa: ANN401 (pydantic hands over whatever was given)
@@ -102,9 +121,9 @@ class FlightSection(_Section):
 
     vehicle: str = "quad"
     autopilot: Literal["ardupilot", "px4"] = "ardupilot"
-    altitude_m: Positive = 50.0
-    speed_m_s: Positive | None = None
-    hold_s: NotNegative = 5.0
+    altitude_m: Annotated[FiniteFloat, Field(gt=0, le=20_000)] = 50.0
+    speed_m_s: Annotated[FiniteFloat, Field(gt=0, le=200)] | None = None
+    hold_s: Annotated[FiniteFloat, Field(ge=0, le=65_535)] = 5.0
     home: tuple[Longitude, Latitude] | None = None
     home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
@@ -119,12 +138,19 @@ class OutputSection(_Section):
 class MissionSpecification(_Section):
     """A mission as it was asked for."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    name: str
     area: AreaSection
     prior: PriorSection = PriorSection()
     search: SearchSection = SearchSection()
     flight: FlightSection = FlightSection()
     output: OutputSection = OutputSection()
+
+    @field_validator("name")
+    @classmethod
+    def _usable_in_file_names(cls, name: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", name):
+            raise ValueError("a name is 1..64 of A-Z a-z 0-9 . _ - and begins with a letter or a digit")
+        return name
 
 
 def specification(data: dict[str, Any], *, base: Path) -> MissionSpecification:
@@ -158,6 +184,9 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
         As `specification` does.
     """
     merged = spec.model_dump(exclude_none=True)
+    asked = _without_none(data.get("search", {}))
+    if "budget" not in asked and merged["search"].get("budget") == DEFAULT_BUDGET and _NO_BUDGET & asked.keys():
+        del merged["search"]["budget"]  # it was filled in: whether it still is follows from what is asked for now
     for section, values in _without_none(data).items():
         if section == "area" and values:
             merged[section] = values

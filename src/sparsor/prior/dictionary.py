@@ -19,6 +19,7 @@ _ALPHA = 0.5  # l1 weight while learning, for maps on the 0..1 scale; 0.1 is slo
 _EPOCHS = 20
 _BATCH = 32
 _MOST_STEPS = 800  # large sets of maps are as well learned from fewer epochs
+_ROUNDING = 1e-9  # maps on the 0..1 scale that differ by less than this are alike
 _ENERGY_LEFT = 1e-8  # of the maps, outside the subspace in which the atoms are learned
 
 
@@ -99,7 +100,7 @@ def polynomial_dictionary(shape: tuple[int, int], atoms: int) -> NDArray[np.floa
 def _principal_coordinates(maps: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     _, spread, axes = np.linalg.svd(maps, full_matrices=False)
     energy = np.square(spread)
-    if not energy[0] > 0:
+    if not spread[0] > _ROUNDING:
         raise ModelError("the training maps are all alike: there is nothing to learn from them")
     kept = int(np.searchsorted(np.cumsum(energy), (1 - _ENERGY_LEFT) * energy.sum())) + 1
     return maps @ axes[:kept].T, axes[:kept]

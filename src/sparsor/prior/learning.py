@@ -67,6 +67,9 @@ def split_maps(sets: Sequence[MapSet], shape: tuple[int, int]) -> TrainingMaps:
     units = sorted({maps.unit for maps in sets})
     if len(units) != 1:
         raise ModelError(f"the fields differ in unit ({', '.join(map(repr, units))}); learn from fields of one unit")
+    sizes = sorted({maps.window_m for maps in sets})
+    if len(sizes) != 1:
+        raise ModelError(f"windows of different sizes, {sizes} m, do not go together; cut all of one size")
     training, validation = [], []
     for maps in sets:
         columns = int(maps.column.max()) + 1
@@ -127,8 +130,10 @@ def untuned_model(
     """
     low, high = float(maps.training.min()), float(maps.training.max())
     if not high > low:
-        raise ModelError(f"the training windows hold one value only, {low:g} {maps.unit}: nothing can be learned")
+        raise ModelError(f"{maps.source}: the training windows hold one value only, {low:g}: nothing to learn")
     training, validation = ((part - low) / (high - low) for part in (maps.training, maps.validation))
+    if not (np.ptp(validation, axis=1) > 0).any():
+        raise ModelError(f"{maps.source}: the validation windows have no contrast: nothing can be judged on them")
     windows = len(training)
     if windows < atoms:
         training = with_mirror_images(training, maps.shape)
@@ -151,7 +156,7 @@ def untuned_model(
         dictionary=psi,
         mean=mean,
         covariance_factor=covariance_factor(training),
-        kernel=fit_kernel(training - training.mean(axis=1, keepdims=True), maps.shape),
+        kernel=fit_kernel(training, maps.shape),
         lasso_weight=_UNTUNED,
         validation=validation,
         scale=(low, high),

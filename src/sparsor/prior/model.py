@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import struct
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -21,6 +23,23 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT = "sparsor model 1"
+
+# What numpy, zipfile and the parsers below them raise for files that are damaged or made up.
+_DAMAGED = (
+    OSError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    NotImplementedError,
+    OverflowError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    struct.error,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True)
@@ -73,21 +92,25 @@ class Model:
     provenance: Mapping[str, str]
 
     def __post_init__(self) -> None:
+        if not min(self.shape) >= 1:
+            raise ModelError(f"its grid is {self.shape[0]} x {self.shape[1]}; each side has to be 1 or more")
         N = self.shape[0] * self.shape[1]
-        for name, array, cells in (
-            ("dictionary", self.dictionary, self.dictionary.shape[0]),
-            ("mean", self.mean, self.mean.size),
-            ("covariance factor", self.covariance_factor, self.covariance_factor.shape[0]),
-            ("validation maps", self.validation, self.validation.shape[-1]),
+        for name, array, axes, cells in (
+            ("dictionary", self.dictionary, 2, self.dictionary.shape[0]),
+            ("mean", self.mean, 1, self.mean.size),
+            ("covariance factor", self.covariance_factor, 2, self.covariance_factor.shape[0]),
+            ("validation maps", self.validation, 2, self.validation.shape[-1]),
         ):
-            if cells != N:
-                raise ModelError(f"the {name} has {cells} cells; a grid of {self.shape} has {N}")
+            if array.ndim != axes or cells != N:
+                raise ModelError(f"the {name} of shape {array.shape} does not fit a grid of {self.shape}")
             if not np.isfinite(array).all():
                 raise ModelError(f"the {name} holds values that are not numbers")
         if self.dictionary.shape[1] < 2 or not len(self.validation):
             raise ModelError("a model needs at least two atoms and one validation map")
         if np.abs(np.linalg.norm(self.dictionary, axis=0) - 1).max() > 0.01:
             raise ModelError("the dictionary's atoms are not of unit norm")
+        if not np.isfinite([*self.scale, *self.window_m, self.lasso_weight]).all():
+            raise ModelError(f"scale {self.scale}, window {self.window_m} or lambda is not a number")
         if not (self.scale[1] > self.scale[0] and self.lasso_weight > 0 and min(self.window_m) > 0):
             raise ModelError(
                 f"scale {self.scale}, lambda {self.lasso_weight:g} or window {self.window_m} is out of range"
@@ -138,7 +161,7 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], source: str) -> Model:
         _check_format(about["format"])
         kernel = Kernel(*(float(value) for value in about["kernel"]))
         return Model(
-            shape=(int(about["shape"][0]), int(about["shape"][1])),
+            shape=(_whole(about["shape"][0]), _whole(about["shape"][1])),
             dictionary=np.ascontiguousarray(arrays["dictionary"], dtype=np.float64),
             mean=arrays["mean"].astype(np.float64),
             covariance_factor=arrays["covariance_factor"].astype(np.float64),
@@ -152,8 +175,14 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], source: str) -> Model:
         )
     except ModelError as error:
         raise ModelError(f"{source}: {error}") from None
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise ModelError(f"{source} is not a sparsor model ({error}); make one with 'sparsor learn'") from error
+
+
+def _whole(value: object) -> int:
+    if not isinstance(value, int):
+        raise TypeError(f"{value!r} is not a whole number")
+    return value
 
 
 def _check_format(found: str) -> None:
@@ -177,20 +206,13 @@ def npz_to_arrays(content: bytes, source: str) -> dict[str, NDArray[Any]]:
         When it is damaged or holds anything but plain arrays; `source` is named in the message.
     """
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            if not isinstance(stored, np.lib.npyio.NpzFile):
-                raise ModelError(f"{source} is not an .npz file; make a model with 'sparsor learn'")
-            return {name: stored[name] for name in stored.files}
-    except (
-        OSError,
-        ValueError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-        KeyError,
-        NotImplementedError,
-    ) as error:
-        raise ModelError(f"{source} cannot be read as .npz ({error}); is it damaged or cut short?") from error
+        loaded = np.load(io.BytesIO(content), allow_pickle=False)
+        if isinstance(loaded, np.lib.npyio.NpzFile):
+            with loaded as stored:
+                return {name: stored[name] for name in stored.files}
+    except (ValueError, *_DAMAGED) as error:
+        raise ModelError(f"{source} cannot be read as .npz; is it damaged, cut short, or something else?") from error
+    raise ModelError(f"{source} is not an .npz file but one array; make a model with 'sparsor learn'")
 
 
 def read_npz(path: Path) -> dict[str, NDArray[Any]]:

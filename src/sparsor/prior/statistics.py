@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MAX_RANK = 64
+_NO_SILL_CELLS = 100
+_LEAST_SHARE = 1e-9  # white noise is all nugget; a kernel still needs a variance
 _LARGEST_LAG = 0.5  # of the shorter side: beyond it a variogram rests on too few pairs
 
 
@@ -36,6 +38,14 @@ class Kernel:
         values = (self.variance, self.length_cells, self.nugget)
         if not (np.isfinite(values).all() and self.variance > 0 and self.length_cells > 0 and self.nugget >= 0):
             raise ModelError(f"{self} is not a kernel: variance and length have to be above 0, the nugget 0 or above")
+
+    @property
+    def words(self) -> str:
+        """The kernel as people read it."""
+        nugget = self.nugget / (self.nugget + self.variance)
+        # Maps without a sill push the fit against its upper end: the number there means nothing more.
+        decay = f"{self.length_cells:.1f}" if self.length_cells < _NO_SILL_CELLS else f"more than {_NO_SILL_CELLS}"
+        return f"exponential, decay over {decay} cells, nugget {nugget:.1%} of the sill"
 
 
 def covariance_factor(maps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -85,15 +95,17 @@ def fit_kernel(maps: NDArray[np.float64], shape: tuple[int, int]) -> Kernel:
     """
     from scipy.optimize import nnls
 
-    lags = np.arange(1, max(3, int(_LARGEST_LAG * min(shape)) + 1))
+    lags = np.arange(1, min(*shape, max(3, int(_LARGEST_LAG * min(shape)) + 1)))
     measured = variogram(maps, shape, lags)
     if not measured.max() > 0:
         raise ModelError("the training maps have no contrast: no kernel can be fitted to them")
+    lags, measured = lags[measured > 0], measured[measured > 0]  # a pattern may repeat itself exactly
     best = (np.inf, 1.0, np.array([1.0, 0.0]))
     for length in np.geomspace(0.5, 8.0 * max(shape), 60):
         # Weighted by 1/gamma^2 (Cressie 1985), so that the short lags, which kriging leans on, count.
         columns = np.stack([1 - np.exp(-lags / length), np.ones(lags.size)], axis=1) / measured[:, None]
         weights, misfit = nnls(columns, np.ones(lags.size))
-        if weights[0] > 0 and misfit < best[0]:
+        if misfit < best[0]:
             best = (misfit, float(length), weights)
-    return Kernel(float(best[2][0]), best[1], float(best[2][1]))
+    variance, nugget = (float(part) for part in best[2])
+    return Kernel(max(variance, _LEAST_SHARE * nugget), best[1], nugget)

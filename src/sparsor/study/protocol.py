@@ -115,6 +115,8 @@ def scaled(maps: MapSet, split: Split) -> SplitMaps:
     """Return the sets of a split, scaled by the least and largest value of the training windows."""
     training = maps.maps[split.training]
     low, high = float(training.min()), float(training.max())
+    if not high > low:
+        raise InputError(f"{maps.source}: the training windows hold one value only, {low:g}: there is no scale")
 
     def on_scale(index: NDArray[np.int64]) -> NDArray[np.float64]:
         return (maps.maps[index] - low) / (high - low)
