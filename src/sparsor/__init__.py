@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from sparsor.errors import InputError, OutputError, SparsorError
     from sparsor.geodesy import BoundingBox, Grid
     from sparsor.geodesy.areas import read_area
+    from sparsor.journeys.folder import write_mission
     from sparsor.journeys.learning import LearnRequest, learn_from_fields
-    from sparsor.journeys.planning import plan_mission, write_mission
+    from sparsor.journeys.planning import plan_mission
     from sparsor.mission import build_mission, plan_bytes, read_plan
     from sparsor.mission.sidecar import read_sidecar
     from sparsor.mission.specification import read_specification, specification
@@ -36,7 +37,8 @@ _HOMES = {
     "sparsor.geodesy": ("BoundingBox", "Grid"),
     "sparsor.geodesy.areas": ("read_area",),
     "sparsor.journeys.learning": ("LearnRequest", "learn_from_fields"),
-    "sparsor.journeys.planning": ("plan_mission", "write_mission"),
+    "sparsor.journeys.folder": ("write_mission",),
+    "sparsor.journeys.planning": ("plan_mission",),
     "sparsor.mission": ("build_mission", "plan_bytes", "read_plan"),
     "sparsor.mission.sidecar": ("read_sidecar",),
     "sparsor.mission.specification": ("read_specification", "specification"),

@@ -76,7 +76,7 @@ def test_boxes(console, tree, box, said):
         ("--workers 0", ("--workers", "1")),
         ("--area area.geojson", ("bbox", "area file")),
         ("--model m.npz --field f.tif", ("field", "model", "not both")),
-        ("--field-bbox 1 2 3 4", ("field_bbox", "field")),
+        ("--field-bbox 1 2 3 4", ("--field-bbox", "--field")),
         ("--model m.npz", ("m.npz", "No such file")),
         ("--field f.tif", ("f.tif", "No such file")),
         ("--field .", ("is a folder",)),

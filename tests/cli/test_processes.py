@@ -63,7 +63,8 @@ def test_ctrl_c_in_the_middle_leaves_the_old_files(tmp_path):
     os.close(theirs)
     assert b"searching" in read_until(ours, b"searching")  # the progress bar of a terminal
     process.send_signal(signal.SIGINT)
-    said = read_until(ours, b"interrupted: nothing was written")
+    said = read_until(ours, b"interrupted: what was there before is still there")
+    assert b"what was there before is still there" in said
     assert process.wait(timeout=30) == 130
     assert process.stdout is not None
     assert process.stdout.read() == b""

@@ -18,7 +18,7 @@ def algorithm_1(psi, validation, shape, *, M, p, theta, n_iter, lambdas, lasso, 
     best = None
     for r in range(n_iter):
         phi = (stream(seed, r).random((M, N)) < p).astype(float)
-        for i in range(N):  # Eq. 9
+        for i in range(N):  # Eq. 11
             if phi[:, i].sum() < theta:
                 phi[:, i] = 0
         image = phi.sum(axis=0) > 0

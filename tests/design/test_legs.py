@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,3 +47,14 @@ def test_crossed_cells_agree_with_walking_the_line(start, end):
 def test_cells_under_a_path_hold_its_stops():
     under = LEGS.cells_under(np.array([0, 5, 40]))
     assert {0, 1, 2, 3, 4, 5, 40} <= set(under.tolist())
+
+
+def test_legs_kept_inside_cross_allowed_cells_only():
+    rng = np.random.default_rng(3)
+    legs = replace(LEGS, allowed=rng.random(LEGS.size) < 0.9)
+    inside = legs.kept_inside()
+    for start, end in rng.integers(0, LEGS.size, (400, 2)):
+        clear = legs.allowed[legs.crossed(start, end)[0]].all()
+        assert inside.leaves(np.array([start, end])) == (not clear)
+        if clear:
+            assert inside.length[start, end] == LEGS.length[start, end]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +12,10 @@ import pytest
 from sparsor.core.metrics import centred_relative_error
 from sparsor.design import lasso
 from sparsor.errors import BudgetError, MissionError, OutputError
-from sparsor.journeys.planning import check_folder, plan_mission, write_mission
+from sparsor.journeys.folder import check_folder, write_mission
+from sparsor.journeys.planning import plan_mission
 from sparsor.mission.sidecar import read_sidecar
-from sparsor.mission.specification import changed, specification
+from sparsor.mission.specification import AreaSection, OutputSection, changed, specification
 
 BOX = (51.50, 25.27, 51.53, 25.30)
 SPEC = specification({"name": "m", "area": {"bbox": BOX}, "search": {"iterations": 30}}, base=Path("/"))
@@ -20,6 +23,10 @@ SPEC = specification({"name": "m", "area": {"bbox": BOX}, "search": {"iterations
 
 def with_search(**settings):
     return changed(SPEC, {"search": settings}, base=Path("/"))
+
+
+def with_box(box):
+    return changed(SPEC, {"area": {"bbox": box}}, base=Path("/"))
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +87,34 @@ def test_a_full_disk_leaves_what_was_there(mission, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_stale_exports_go(mission, tmp_path):
-    (tmp_path / "m.kml").write_text("an old route")
-    (tmp_path / "other.kml").write_text("of another mission")
+def test_what_an_earlier_mission_made_goes_and_a_strangers_files_stay(mission, tmp_path):
+    with_kml = SPEC.model_copy(update={"output": OutputSection(export=("kml",)), "name": "before"})
+    write_mission(replace(mission, specification=with_kml), tmp_path, preview=False)
+    assert (tmp_path / "before.kml").is_file()
+    (tmp_path / "m.kml").write_text("a stranger's")
     written = write_mission(mission, tmp_path, preview=False)
-    assert {path.name for path in tmp_path.iterdir()} == {*written, "other.kml"}
+    assert {path.name for path in tmp_path.iterdir()} == {*written, "m.kml"}
+
+
+def test_a_file_that_is_read_is_never_written_over(tmp_path):
+    area = tmp_path / "site.geojson"
+    spec = SPEC.model_copy(
+        update={"name": "site", "area": AreaSection(file=area), "output": OutputSection(export=("geojson",))}
+    )
+    with pytest.raises(MissionError, match="is read for this mission and would be written over"):
+        check_folder(spec, tmp_path, force=True)
+
+
+def test_the_box_that_is_said_to_fit_is_flyable():
+    study = plan_mission(with_box((51.30, 25.10, 51.66, 25.42)), workers=2)
+    assert not study.flyable
+    east_km, north_km = (
+        float(side) for side in re.search(r"box of ([0-9.]+) x ([0-9.]+) km", study.warnings[0]).groups()
+    )
+    east_deg, north_deg = east_km / 100.8, north_km / 110.8
+    small = plan_mission(with_box((51.5, 25.25, 51.5 + east_deg, 25.25 + north_deg)), workers=2)
+    # Another box has another route: near the advised size it is within a tenth of what fits.
+    assert small.flight_time_s < 1.1 * small.usable_s
 
 
 def test_which_folders_are_free(mission, tmp_path):

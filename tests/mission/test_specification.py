@@ -35,7 +35,7 @@ searches = optional(
     paper=st.booleans(),
     rows=st.integers(1, 1024),
     probability=st.floats(1e-6, 1),
-    theta=st.integers(0, 40),
+    theta=st.integers(0, 1),
     lasso=above_zero,
     lambda_valid=st.floats(0, 1e6),
     lambda_path=st.floats(0, 1e6),
@@ -141,7 +141,7 @@ def test_changes_keep_the_rest():
         ({"area": {}}, "^area: give either a bbox .* or an area file"),
         ({"area": {"bbox": BOX, "file": "a.kml"}}, "^area: give either"),
         ({"area": {"bbox": (1, 2, 3)}}, r"^area\.bbox"),
-        ({"prior": {"variable": "no2"}}, "^prior: variable need a field"),
+        ({"prior": {"variable": "no2"}}, "^prior: --variable only make sense with --field"),
         ({"prior": {"field": "f.tif", "model": "m.npz"}}, "^prior: .* not both"),
         ({"search": {"iterations": 0}}, r"^search\.iterations: .* given 0"),
         ({"search": {"lambda_path": float("nan")}}, r"^search\.lambda_path: .* given nan"),
@@ -164,3 +164,13 @@ def test_files_that_are_no_specification_are_named(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(MissionError, match=r"mission\.toml'"):
         read_specification(path)
+
+
+def test_filled_in_values_follow_from_what_is_asked_for_now():
+    """Whoever turns the default budget off and then asks for one gets a search within it, and the other way round."""
+    budgeted = spec()
+    assert budgeted.search.budget == "10%"
+    free = changed(budgeted, {"search": {"lambda_path": 0.1}}, base=Path("/"))
+    assert (free.search.budget, free.search.probability, free.search.theta) == (None, 0.03, 3)
+    again = changed(free, {"search": {"budget": "20%"}}, base=Path("/"))
+    assert (again.search.budget, again.search.probability, again.search.theta) == ("20%", None, None)

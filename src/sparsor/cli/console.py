@@ -107,8 +107,7 @@ def print_table(rows: Sequence[tuple[str, str]], title: str) -> None:
     Console(highlight=False, soft_wrap=False).print(table)
 
 
-def warn(warnings: Sequence[str], talk: Talk) -> None:
+def warn(warnings: Sequence[str]) -> None:
     """Print warnings on stderr."""
-    if talk is not Talk.QUIET:
-        for warning in warnings:
-            typer.echo(f"warning: {warning}", err=True)
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)

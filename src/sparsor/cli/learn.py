@@ -98,10 +98,10 @@ def learn(
             }
         )
         return
-    warn(learned.warnings, talk)
     if talk is Talk.QUIET:
         typer.echo(output)
         return
+    warn(learned.warnings)
     print_table(
         [
             (

@@ -106,7 +106,7 @@ def plan(
         str | None,
         _option(
             SEARCH,
-            "Longest flight: 10% (of full coverage), 12km, 25min (default: 10%).",
+            "Longest path over the stops, 10% (of full coverage) or 12km, or time in the air, 25min (default: 10%).",
             "--budget",
             metavar="LIMIT",
         ),
@@ -140,7 +140,7 @@ def plan(
         float | None,
         _option(
             SEARCH,
-            "Search on until this has passed; the plan then depends on the machine.",
+            "Search for this long, not by --iterations; the plan then depends on the machine.",
             "--time",
             metavar="SECONDS",
         ),
@@ -229,7 +229,9 @@ def plan(
         "output": {"export": _formats(export)},
     }
     spec, folder = _request(given, mission_file, output)
-    from sparsor.journeys.planning import check_folder, plan_mission, write_mission
+    from sparsor.journeys.advice import advice
+    from sparsor.journeys.folder import check_folder, write_mission
+    from sparsor.journeys.planning import plan_mission
 
     check_folder(spec, folder, force=force)
     with progress_bar(talk) as progress:
@@ -239,7 +241,8 @@ def plan(
     if as_json:
         print_json(result)
         return
-    warn(mission.warnings, talk)
+    # What says that a mission cannot fly, or is a slip, is said even to those who asked for quiet.
+    warn(advice(mission) if talk is Talk.QUIET else mission.warnings)
     if talk is Talk.QUIET:
         typer.echo(written[f"{spec.name}.plan"])
         return
@@ -269,7 +272,7 @@ def _request(
 
         BoundingBox(*box)  # its errors say more than the specification's
     if given["name"] is None:
-        given["name"] = output.name if output is not None else _default_name(box, area)
+        given["name"] = _default_name(box, area) if output is None else _cleaned(output.resolve().name)
     try:
         spec = specification(given, base=Path.cwd())
     except MissionError as error:
@@ -279,15 +282,20 @@ def _request(
 
 def _as_typed(message: str) -> str:
     """Return a message about keys of mission.toml as one about the options that were typed for them."""
-    message = message.replace("search.time_s", "--time")
+    message = message.replace("search.time_s", "--time").replace("prior.time", "--field-time")
     message = re.sub(r"\b(?:search|flight|prior|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)
 
 
+def _cleaned(name: str) -> str:
+    """Return a name that can stand in file names everywhere."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-._")[:64] or "mission"
+
+
 def _default_name(box: Box | None, area: Path | None) -> str:
     if area is not None:
-        return re.sub(r"[^A-Za-z0-9._-]+", "-", area.stem).strip("-._") or "mission"
+        return _cleaned(area.stem)
     assert box is not None
     return "box_" + "_".join(f"{side:g}" for side in box)
 
@@ -305,6 +313,7 @@ def _result(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "cells_measured": int(found.stops.size),
         "cells_flown_over": mission.cells_flown_over,
         "path_length_m": mission.path_length_m,
+        "flown_length_m": mission.flown_length_m,
         "path_length_cells": found.length_cells,
         "coverage_fraction": mission.coverage_fraction,
         "flight_time_s": mission.flight_time_s,
@@ -337,7 +346,8 @@ def _summary(mission: PlannedMission, talk: Talk) -> list[tuple[str, str]]:
         (
             "distance",
             f"{mission.path_length_m / 1000:.2f} km over the stops, {mission.coverage_fraction:.1%} of full coverage "
-            f"({mission.place.full_coverage_m / 1000:.0f} km)",
+            f"({mission.place.full_coverage_m / 1000:.0f} km); "
+            f"{mission.flown_length_m / 1000:.2f} km with the way home",
         ),
         (
             "time in the air",
@@ -361,7 +371,7 @@ def _summary(mission: PlannedMission, talk: Talk) -> list[tuple[str, str]]:
         table += [
             (
                 "sample",
-                f"r = {found.sample} of {spec.search.iterations}, p = {found.probability:.4g}, theta = {found.theta}",
+                f"r = {found.sample}, p = {found.probability:.4g}, theta = {found.theta}",
             ),
             (
                 "cost",

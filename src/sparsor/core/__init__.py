@@ -1,1 +1,1 @@
-"""What every stage may use: atomic files, progress, random streams, workers."""
+"""What every stage may use: atomic files, metrics, progress, random streams, workers."""

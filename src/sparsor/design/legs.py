@@ -6,7 +6,7 @@ it between two waypoints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -36,6 +36,8 @@ class LegTable:
         ``N - 1`` cell units is as long as full coverage. 1 where lengths are cell widths.
     allowed : array of bool (N,)
         Cells that may be visited.
+    longest : float
+        No path of legs that stay inside is longer.
     """
 
     shape: tuple[int, int]
@@ -43,11 +45,41 @@ class LegTable:
     seconds: NDArray[np.float64]
     cell_unit: float
     allowed: NDArray[np.bool_]
+    longest: float = np.inf
 
     @property
     def size(self) -> int:
         """Number of cells."""
         return self.shape[0] * self.shape[1]
+
+    @property
+    def passable(self) -> NDArray[np.bool_]:
+        """Whether each leg stays on cells that may be flown, (N, N)."""
+        rows, columns = self.shape
+        open_cells = self.allowed.reshape(self.shape)
+        table = np.ones((rows, columns, rows, columns), dtype=np.bool_)
+        if not open_cells.all():
+            for down in range(rows):
+                for across in range(-columns + 1, columns):
+                    _mark_offset(table, open_cells, down, across)
+        return table.reshape(self.size, self.size)
+
+    def kept_inside(self) -> LegTable:
+        """Return the table with every leg that leaves the allowed cells longer than any path of the others."""
+        closed = ~self.passable
+        if not closed.any():
+            return self
+        longest = self.size * float(self.length.max())
+        return replace(
+            self,
+            length=np.where(closed, 2 * longest, self.length),
+            seconds=np.where(closed, 2 * self.size * self.seconds.max(), self.seconds),
+            longest=longest,
+        )
+
+    def leaves(self, stops: NDArray[np.int64]) -> bool:
+        """Return whether a path over `stops` leaves the allowed cells; known after `kept_inside`."""
+        return self.path_length(stops) > self.longest
 
     def path_length(self, stops: NDArray[np.int64]) -> float:
         """Return the length of the open path over `stops` in order, in the unit of `length`."""
@@ -91,6 +123,21 @@ def unit_legs(shape: tuple[int, int] = (32, 32)) -> LegTable:
     row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])
     length = np.hypot(row[:, None] - row, column[:, None] - column)
     return LegTable(shape, length, length, 1.0, np.ones(row.size, dtype=np.bool_))
+
+
+def _mark_offset(table: NDArray[np.bool_], open_cells: NDArray[np.bool_], down: int, across: int) -> None:
+    """Mark all legs of one offset, and the ways back, at once: they cross cells in the same pattern."""
+    rows, columns = open_cells.shape
+    first = max(0, -across)
+    height, width = rows - down, columns - abs(across)
+    clear = np.ones((height, width), dtype=np.bool_)
+    rows_off, columns_off, _ = _crossing(down, abs(across))
+    for row, column in zip(rows_off.tolist(), (columns_off * np.sign(across)).tolist(), strict=True):
+        clear &= open_cells[row : row + height, first + column : first + column + width]
+    row, column = np.indices((height, width))
+    start, end = (row, column + first), (row + down, column + first + across)
+    table[*start, *end] = clear
+    table[*end, *start] = clear
 
 
 @cache

@@ -13,23 +13,19 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import count
 from threading import Lock
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002
-from threadpoolctl import threadpool_limits
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
+from sparsor.core.workers import one_blas_thread
 from sparsor.design.budget import Budget  # noqa: TC001
 from sparsor.design.candidate import reconstruction_error
 from sparsor.design.legs import LegTable  # noqa: TC001
 from sparsor.design.route import shortest_path
 from sparsor.design.sensing import draw_phi, incoherence, measured_atoms
 from sparsor.errors import BudgetError, DesignError
-
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
 
 _BLOCK = 16  # samples handed to a worker at a time
 _SLICE = 256  # blocks that wait for a worker
@@ -41,7 +37,7 @@ Sparsity = Callable[[np.random.Generator], tuple[float, int]]
 
 @dataclass(frozen=True)
 class Weights:
-    """The three weights of the cost C (the paper's Eq. 4)."""
+    """The three weights of the cost C (the paper's Eq. 6)."""
 
     valid: float = 1.0
     path: float = 0.0
@@ -168,7 +164,7 @@ def search(
     iterations : int
         n_iter, the number of samples.
     seconds : float, optional
-        Goes on beyond `iterations` until this much time has passed; the answer then depends on the machine.
+        Search for this long instead of `iterations`; the answer then depends on the machine.
     workers : int
         Threads; the compiled parts run side by side.
     progress : Progress
@@ -187,22 +183,23 @@ def search(
     def run(block: int) -> int:
         last = min((block + 1) * _BLOCK, iterations) if seconds is None else (block + 1) * _BLOCK
         for sample in range(block * _BLOCK, last):
-            _try_sample(problem, sparsity, weights, seed, sample, best)
+            _try_draw(problem, sparsity, weights, stream(seed, sample), sample, best)
         return last
 
-    blocks = range(-(-iterations // _BLOCK))
+    tried = 0
     with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
         try:
-            deadline = time.monotonic() + (seconds or 0.0)
-            for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
-                for done in pool.map(run, blocks[first : first + _SLICE]):
-                    progress("searching", min(done, iterations), iterations)
-            if seconds is not None:
-                _continue_until(deadline, pool, run, len(blocks), workers)
+            if seconds is None:
+                blocks = range(-(-iterations // _BLOCK))
+                for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
+                    for tried in pool.map(run, blocks[first : first + _SLICE]):
+                        progress("searching", tried, iterations)
+            else:
+                tried = _search_for(seconds, pool, run, workers, progress)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return _winner(problem, best, iterations)
+    return _winner(problem, best, tried)
 
 
 def evaluate(
@@ -214,27 +211,23 @@ def evaluate(
     return best.candidate
 
 
-def one_blas_thread() -> AbstractContextManager[object]:
-    """Return the context in which sums come out the same on any number of cores: one BLAS thread a worker."""
-    return cast("AbstractContextManager[object]", threadpool_limits(1))
-
-
 def fixed_sparsity(probability: float, theta: int) -> Sparsity:
     """Return the paper's sampling: the same p and theta for every sample."""
     return lambda _rng: (probability, theta)
 
 
-def _continue_until(
-    deadline: float, pool: ThreadPoolExecutor, run: Callable[[int], int], first: int, workers: int
-) -> None:
-    for block in count(first, workers):
-        if time.monotonic() >= deadline:
-            return
-        list(pool.map(run, range(block, block + workers)))
-
-
-def _try_sample(problem: Problem, sparsity: Sparsity, weights: Weights, seed: int, sample: int, best: _Best) -> None:
-    _try_draw(problem, sparsity, weights, stream(seed, sample), sample, best)
+def _search_for(
+    seconds: float, pool: ThreadPoolExecutor, run: Callable[[int], int], workers: int, progress: Progress
+) -> int:
+    """Work through blocks until the time is up; return how many samples were tried."""
+    start = time.monotonic()
+    for block in count(0, workers):
+        tried = max(pool.map(run, range(block, block + workers)))
+        passed = time.monotonic() - start
+        progress("searching", int(min(passed, seconds) * 1000), int(seconds * 1000))
+        if passed >= seconds:
+            break
+    return tried
 
 
 def _try_draw(
@@ -254,6 +247,8 @@ def _try_draw(
     if cells.size < 2:  # an empty Phi has no path and would win any large lambda_path
         return
     stops = shortest_path(cells, legs.length, improve=problem.improve)
+    if legs.leaves(stops):
+        return
     if problem.budget is not None:
         used = problem.budget.used(stops, legs)
         if used > problem.budget.limit:
@@ -286,4 +281,6 @@ def _winner(problem: Problem, best: _Best, iterations: int) -> Candidate:
             f"no route within {say(problem.budget.limit)} among {iterations} samples: the shortest found "
             f"is {say(best.shortest)}. Allow a larger --budget or more --iterations."
         )
-    raise DesignError(f"none of {iterations} samples visits two cells: raise --probability or lower --theta")
+    raise DesignError(
+        f"none of {iterations} samples visits two cells on a path inside the area: raise --probability or lower --theta"
+    )

@@ -22,7 +22,7 @@ def draw_phi(rng: np.random.Generator, rows: int, cells: int, probability: float
     probability : float
         Of a 1 in each entry.
     theta : int
-        Enhanced Sparsification (the paper's Eq. 9): a column with fewer than `theta` ones is set to zero;
+        Enhanced Sparsification (the paper's Eq. 11): a column with fewer than `theta` ones is set to zero;
         0 or 1 turns it off.
 
     Returns
@@ -55,7 +55,7 @@ def measured_atoms(phi: NDArray[np.bool_], cells: NDArray[np.int64], psi: NDArra
 
 
 def incoherence(atoms: NDArray[np.float64], phi: NDArray[np.bool_], *, unit_rows: bool = True) -> float:
-    """Return mu, the largest absolute inner product between rows of Phi and atoms of Psi (the paper's Eq. 5).
+    """Return mu, the largest absolute inner product between rows of Phi and atoms of Psi (the paper's Eq. 7).
 
     Parameters
     ----------

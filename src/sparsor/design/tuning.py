@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.core.streams import stream
-from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity, one_blas_thread
+from sparsor.core.workers import one_blas_thread
+from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity
 from sparsor.errors import DesignError
 
 if TYPE_CHECKING:

@@ -10,18 +10,30 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sparsor.core.files import sha256_of, write_file
 from sparsor.core.metrics import centred_relative_error
 from sparsor.core.progress import Progress, silent
+from sparsor.core.workers import one_blas_thread
 from sparsor.design import unit_legs
 from sparsor.design.lars import lasso
 from sparsor.design.tuning import choose_lasso_weight
 from sparsor.errors import ModelError, OutputError
-from sparsor.prior.builtin import SHAPE, SIDES_M, builtin_maps, builtin_model, nearest_side_m
+from sparsor.prior.builtin import (
+    SEED,
+    SHAPE,
+    TRAINING_MAPS,
+    VALIDATION_MAPS,
+    builtin_maps,
+    builtin_model,
+    nearest_side_m,
+)
 from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, split_maps, untuned_model
 from sparsor.prior.mismatch import mismatch_factor
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz, read_model
 from sparsor.prior.reading import read_field
+from sparsor.prior.resampling import sample_at
 from sparsor.prior.synthetic import covers
 from sparsor.prior.windows import ground_windows, nearest_resolved_m
 
@@ -104,7 +116,8 @@ def learn_model(
     ModelError
         When the maps have no contrast, or the number of atoms is out of range.
     """
-    model = untuned_model(maps, atoms=atoms, centred=centred, dictionary=dictionary, seed=seed, progress=progress)
+    with one_blas_thread():
+        model = untuned_model(maps, atoms=atoms, centred=centred, dictionary=dictionary, seed=seed, progress=progress)
     progress("choosing lambda", 0, 1)
     weight = choose_lasso_weight(model.dictionary, model.validation - model.mean, unit_legs(model.shape), seed=seed)
     progress("choosing lambda", 1, 1)
@@ -118,7 +131,7 @@ def representation_error(model: Model) -> float:
     model's lambda: what is left when nothing but the dictionary limits the reconstruction.
     """
     coded = lasso(model.dictionary, model.validation - model.mean, model.lasso_weight)
-    return float(centred_relative_error(model.validation, coded @ model.dictionary.T + model.mean).mean())
+    return float(np.nanmean(centred_relative_error(model.validation, coded @ model.dictionary.T + model.mean)))
 
 
 def with_sources(model: Model, fields: Mapping[Path, Field]) -> Model:
@@ -163,7 +176,7 @@ def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) 
     if atoms == DEFAULT_ATOMS and not paper:
         model = builtin_model(side)
     else:
-        key = {"built-in": side, "atoms": atoms, "centred": not paper}
+        key = {"built-in": [side, SEED, TRAINING_MAPS, VALIDATION_MAPS], "atoms": atoms, "centred": not paper}
         model = _cached(key, lambda: learn_model(builtin_maps(side), atoms=atoms, centred=not paper, progress=progress))
     warnings = ["The prior is the built-in synthetic Gulf NO2 field, not a measurement: give --field or --model."]
     if not covers(box.as_tuple()):
@@ -171,14 +184,8 @@ def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) 
             f"The built-in field is the Gulf's, the box lies at {box.centre_lon_deg:.4g} E, {box.centre_lat_deg:.4g} N "
             "(are longitude and latitude swapped? The order is west south east north)."
         )
-    size = (box.east_m * box.north_m) ** 0.5
-    widening = mismatch_factor(max(side / size, size / side))
-    if not SIDES_M[0] / _BETWEEN_SIDES <= size <= SIDES_M[-1] * _BETWEEN_SIDES:
-        warnings.append(
-            f"The built-in models cover boxes of {SIDES_M[0] / 1000:g} to {SIDES_M[-1] / 1000:g} km; for one "
-            f"of {size / 1000:.3g} km the expected error is widened {widening:.2f} times."
-        )
-    return PriorChoice(model, None, True, widening, tuple(warnings))
+    widening, said = _size_difference(model, box, said_from=_BETWEEN_SIDES)
+    return PriorChoice(model, None, True, widening, (*warnings, *said))
 
 
 def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) -> PriorChoice:
@@ -210,6 +217,10 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
     model = with_sources(model, {request.field: field})
     widening, said = _size_difference(model, box)
     notes = [*field.notes, *said]
+    if not np.isfinite(sample_at(field, box.centre_lon_deg, box.centre_lat_deg)):
+        notes.append(
+            "The middle of the box lies outside the field, or in a gap of it: maps there are taken to look alike."
+        )
     if model.atoms < atoms:
         notes.append(
             f"The field gave {model.provenance['training_maps']} training windows, so the dictionary has "
@@ -218,12 +229,13 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
     return PriorChoice(model, field, False, widening, tuple(notes))
 
 
-def _size_difference(model: Model, box: BoundingBox) -> tuple[float, tuple[str, ...]]:
+def _size_difference(model: Model, box: BoundingBox, *, said_from: float = _SAME_SIZE) -> tuple[float, tuple[str, ...]]:
+    """Return the factor on the expected error, and the sentence for windows `said_from` times off or more."""
     east_m, north_m = model.window_m
-    ratio = ((east_m * north_m) / (box.east_m * box.north_m)) ** 0.5
-    if 1 / _SAME_SIZE <= ratio <= _SAME_SIZE:
-        return 1.0, ()
-    widening = mismatch_factor(max(ratio, 1 / ratio))
+    ratio = max(east_m / box.east_m, box.east_m / east_m, north_m / box.north_m, box.north_m / north_m)
+    widening = mismatch_factor(ratio)
+    if ratio <= said_from:
+        return widening, ()
     sentence = (
         f"The model was learned from windows of {east_m / 1000:.4g} x {north_m / 1000:.4g} km, the box is "
         f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km: the expected error is widened "

@@ -1,15 +1,13 @@
-"""From a box on the map to a mission folder."""
+"""From what was asked for to a planned mission."""
 
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.core.files import write_files
 from sparsor.core.progress import Progress, silent
 from sparsor.design import Budget, LegTable, Problem, fixed_sparsity, parse_budget, search, searched_sparsity
 from sparsor.design.expectation import expected_errors
@@ -19,10 +17,9 @@ from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
 from sparsor.geodesy.lengths import distance_m
+from sparsor.journeys.advice import advice
 from sparsor.journeys.modelling import PriorChoice, choose_prior
-from sparsor.mission import FORMATS, Home, MissionPlan, build_mission, export_bytes, plan_bytes
-from sparsor.mission.sidecar import Sidecar, content_hash, sidecar_npz
-from sparsor.mission.specification import MissionSpecification, read_specification, specification_toml
+from sparsor.mission import Home, MissionPlan, build_mission
 from sparsor.vehicle import (
     Autopilot,
     Vehicle,
@@ -34,17 +31,11 @@ from sparsor.vehicle import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     from sparsor.design import Candidate, Weights
     from sparsor.design.monte_carlo import Sparsity
-
-SPECIFICATION_FILE = "mission.toml"
-PREVIEW_FILE = "preview.png"
-_HARDLY_BETTER = 0.9
-_FAR_HOME = 3.0  # diagonals of the box
+    from sparsor.mission.specification import MissionSpecification
 
 
 @dataclass(frozen=True)
@@ -74,6 +65,8 @@ class PlannedMission:
     plan : MissionPlan
     path_length_m : float
         Of the open path over the stops.
+    flown_length_m : float
+        The same with the ways from and to home.
     flight_time_s : float
         From take-off to landing.
     expected_relative_error : float
@@ -91,6 +84,7 @@ class PlannedMission:
     weights: Weights
     plan: MissionPlan
     path_length_m: float
+    flown_length_m: float
     flight_time_s: float
     cells_flown_over: int
     expected_relative_error: float
@@ -151,67 +145,6 @@ def plan_mission(
     return _assemble(spec, place, prior, vehicle, autopilot, problem, weights, candidate)
 
 
-def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True) -> dict[str, Path]:
-    """Write a mission's folder, all of its files or none; return what is where.
-
-    Plans, sidecar and exports of the mission that was there before and that this one does not make are removed,
-    so that no old route lies beside the new one.
-
-    Raises
-    ------
-    OutputError
-        When the folder cannot be written.
-    """
-    name = mission.specification.name
-    contents = {SPECIFICATION_FILE: specification_toml(mission.specification, folder)}
-    contents[f"{name}.plan"] = plan_bytes(mission.plan)
-    for export in mission.specification.output.export:
-        contents[f"{name}.{export}"] = export_bytes(mission.plan, name, export)
-    hashes = {file: content_hash(content) for file, content in contents.items() if file.endswith(".plan")}
-    contents[f"{name}.npz"] = sidecar_npz(_sidecar(mission, hashes))
-    if preview:
-        from sparsor.journeys.preview import preview_png
-
-        contents[PREVIEW_FILE] = preview_png(mission)
-    stale = _files_before(folder, name) - contents.keys()
-    write_files(folder, contents)
-    for file in stale:
-        (folder / file).unlink(missing_ok=True)
-    return {file: folder / file for file in contents}
-
-
-def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> None:
-    """Refuse to write over another mission: a folder is free when it is empty or asks for the same.
-
-    Raises
-    ------
-    MissionError
-    """
-    for path in (folder, *folder.parents):
-        if path.is_file():
-            raise MissionError(f"'{path}' is a file; give a folder with -o")
-    if force or not folder.exists() or not any(folder.iterdir()):
-        return
-    if (folder / SPECIFICATION_FILE).is_file():
-        try:
-            same = read_specification(folder / SPECIFICATION_FILE) == spec
-        except MissionError:
-            same = False
-        if same:
-            return
-    raise MissionError(
-        f"'{folder}' holds something else already: choose another --name or -o, or write over it with --force"
-    )
-
-
-def _files_before(folder: Path, name: str) -> set[str]:
-    """Return the names of what an earlier mission in a folder consists of, beside specification and picture."""
-    names = {name}
-    with suppress(MissionError):
-        names.add(read_specification(folder / SPECIFICATION_FILE).name)
-    return {f"{name}.{suffix}" for name in names for suffix in ("plan", "npz", *FORMATS)}
-
-
 def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
     if spec.area.bbox is not None:
         return BoundingBox(*spec.area.bbox), None
@@ -234,7 +167,7 @@ def _speed(spec: MissionSpecification, vehicle: Vehicle) -> float:
 def _legs(place: Place, speed_m_s: float) -> LegTable:
     length_m = place.grid.lengths_m()
     cell_unit_m = place.full_coverage_m / (int(place.allowed.sum()) - 1)
-    return LegTable(place.grid.shape, length_m, length_m / speed_m_s, cell_unit_m, place.allowed)
+    return LegTable(place.grid.shape, length_m, length_m / speed_m_s, cell_unit_m, place.allowed).kept_inside()
 
 
 def _budget(spec: MissionSpecification, vehicle: Vehicle, autopilot: Autopilot, place: Place) -> Budget | None:
@@ -308,6 +241,7 @@ def _assemble(
     weights: Weights,
     candidate: Candidate,
 ) -> PlannedMission:
+    candidate = _nearer_end_first(spec, place, candidate)
     flight, stops = spec.flight, candidate.stops
     lon, lat = place.grid.centres_deg(stops)
     plan = build_mission(
@@ -342,88 +276,25 @@ def _assemble(
         weights=weights,
         plan=plan,
         path_length_m=path_m,
+        flown_length_m=path_m + float(transit),
         flight_time_s=seconds,
         cells_flown_over=problem.legs.cells_under(stops).size,
         expected_relative_error=sums * prior.widening,
         expected_relative_error_cells=cells * prior.widening,
         warnings=(),
     )
-    said = (
-        *_what_would_fly(mission),
-        *_what_would_help(mission),
-        *_far_home(mission),
-        *plan.warnings,
-        *prior.warnings,
-    )
-    return replace(mission, warnings=said)
+    return replace(mission, warnings=(*advice(mission), *plan.warnings, *prior.warnings))
+
+
+def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candidate) -> Candidate:
+    """Return the candidate with its path turned so that it begins at the end nearer home."""
+    if spec.flight.home is None:
+        return candidate
+    first_m, last_m = distance_m(*spec.flight.home, *place.grid.centres_deg(candidate.stops[[0, -1]]))
+    return replace(candidate, stops=candidate.stops[::-1].copy()) if last_m < first_m else candidate
 
 
 def _home(spec: MissionSpecification, first_lon: float, first_lat: float) -> Home:
     lon, lat = spec.flight.home or (first_lon, first_lat)
     altitude = spec.flight.home_altitude_m
     return Home(lon, lat, altitude or 0.0, altitude_known=altitude is not None)
-
-
-def _what_would_fly(mission: PlannedMission) -> tuple[str, ...]:
-    """Return the sentence that says what would make the mission flyable; none when it is."""
-    if mission.flyable:
-        return ()
-    shrink = mission.usable_s / mission.flight_time_s
-    box = mission.place.grid.box
-    sentence = (
-        f"A planning study, not a flight: it takes {mission.flight_time_s / 60:.0f} min in the air, the "
-        f"{mission.vehicle.name} has {mission.usable_s / 60:.0f} min less its reserve. A box of about "
-        f"{shrink * box.east_m / 1000:.2g} x {shrink * box.north_m / 1000:.2g} km would fit, or a budget of "
-        f"{mission.usable_s / 60:.0f}min where a route that short exists, or a vehicle of longer endurance "
-        "(--vehicle FILE.toml)."
-    )
-    return (sentence,)
-
-
-def _what_would_help(mission: PlannedMission) -> tuple[str, ...]:
-    """Return the sentence for a plan whose map would hardly be better than its mean; none for others."""
-    if mission.expected_relative_error < _HARDLY_BETTER:
-        return ()
-    sentence = (
-        f"The expected error, {mission.expected_relative_error:.2f} of the map's contrast, is hardly better than "
-        "knowing the map's mean (1): allow a larger --budget, or learn the prior from more or larger fields."
-    )
-    return (sentence,)
-
-
-def _far_home(mission: PlannedMission) -> tuple[str, ...]:
-    """Return the sentence for a home that lies so far away that it may be a slip; none for others."""
-    box, home = mission.place.grid.box, mission.plan.home
-    away_m = float(distance_m(home.lon_deg, home.lat_deg, box.centre_lon_deg, box.centre_lat_deg))
-    if away_m < _FAR_HOME * np.hypot(box.east_m, box.north_m):
-        return ()
-    return (
-        f"Home, {home.lon_deg:g} {home.lat_deg:g}, lies {away_m / 1000:.0f} km from the middle of the box: are "
-        "longitude and latitude swapped? The order is longitude, latitude.",
-    )
-
-
-def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
-    plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
-    return Sidecar(
-        name=mission.specification.name,
-        grid=mission.place.grid,
-        allowed=mission.place.allowed,
-        model=mission.prior.model,
-        phi=candidate.phi,
-        stops=candidate.stops,
-        altitude_m=flight.altitude_m,
-        hold_s=flight.hold_s,
-        home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
-        home_altitude_known=plan.home.altitude_known,
-        lasso_weight=mission.specification.search.lasso or mission.prior.model.lasso_weight,
-        expected={
-            "relative_error": mission.expected_relative_error,
-            "relative_error_cells": mission.expected_relative_error_cells,
-            "cost": candidate.cost,
-            "squared_error": candidate.error,
-            "path_length_cells": candidate.length_cells,
-            "incoherence": candidate.incoherence,
-        },
-        plans=hashes,
-    )

@@ -105,13 +105,19 @@ def read_sidecar(path: Path) -> Sidecar:
     try:
         arrays = read_npz(path)
         about = json.loads(str(arrays["sidecar"]))
-        if about["format"] != FORMAT:
-            raise MissionError(f"'{path}' is a '{about['format']}'; this version reads '{FORMAT}'")
+        _check_format(about["format"], path)
         return _from_arrays(about, arrays, model_from_arrays(arrays, f"'{path}'"))
     except ModelError as error:
         raise MissionError(str(error)) from None
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+    except MissionError:
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise MissionError(f"'{path}' is not a sidecar of sparsor ({error}); plan the mission again") from error
+
+
+def _check_format(found: str, path: Path) -> None:
+    if found != FORMAT:
+        raise MissionError(f"'{path}' is a '{found}'; this version reads '{FORMAT}'")
 
 
 def content_hash(content: bytes) -> str:

@@ -66,10 +66,16 @@ class PriorSection(_Section):
     def _field_options(self) -> Self:
         if self.field is not None and self.model is not None:
             raise ValueError("give either a field to learn from or a model, not both")
-        of_field = ("variable", "time", "field_bbox", "field_colormap", "field_range")
-        given = [name for name in of_field if getattr(self, name) is not None]
+        options = {
+            "variable": "--variable",
+            "time": "--field-time",
+            "field_bbox": "--field-bbox",
+            "field_colormap": "--field-colormap",
+            "field_range": "--field-range",
+        }
+        given = [option for name, option in options.items() if getattr(self, name) is not None]
         if given and self.field is None:
-            raise ValueError(f"{', '.join(given)} need a field")
+            raise ValueError(f"{', '.join(given)} only make sense with --field")
         return self
 
 
@@ -89,6 +95,12 @@ class SearchSection(_Section):
     time_s: Positive | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     budget: str | None = None
+
+    @model_validator(mode="after")
+    def _theta_within_rows(self) -> Self:
+        if self.theta is not None and self.theta > self.rows:
+            raise ValueError(f"theta is {self.theta}; it has to be 0..{self.rows}, the number of rows of Phi")
+        return self
 
     @field_validator("budget")
     @classmethod
@@ -110,7 +122,7 @@ class SearchSection(_Section):
         no_default = filled.get("paper") or "lambda_path" in filled or both
         if "budget" not in filled and no_default:
             filled.setdefault("probability", PAPER_PROBABILITY)
-            filled.setdefault("theta", PAPER_THETA)
+            filled.setdefault("theta", min(PAPER_THETA, filled.get("rows", PAPER_THETA)))
         elif "budget" not in filled:
             filled["budget"] = DEFAULT_BUDGET
         return filled
@@ -144,6 +156,13 @@ class MissionSpecification(_Section):
     search: SearchSection = SearchSection()
     flight: FlightSection = FlightSection()
     output: OutputSection = OutputSection()
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that this mission is made from."""
+        vehicle = Path(self.flight.vehicle) if self.flight.vehicle.endswith(".toml") else None
+        paths = (self.area.file, self.prior.field, self.prior.model, vehicle)
+        return tuple(path for path in paths if path is not None)
 
     @field_validator("name")
     @classmethod
@@ -185,8 +204,14 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
     """
     merged = spec.model_dump(exclude_none=True)
     asked = _without_none(data.get("search", {}))
-    if "budget" not in asked and merged["search"].get("budget") == DEFAULT_BUDGET and _NO_BUDGET & asked.keys():
-        del merged["search"]["budget"]  # it was filled in: whether it still is follows from what is asked for now
+    search = merged["search"]
+    # What was filled in follows from what is asked for now, not from what was asked for then.
+    if "budget" not in asked and search.get("budget") == DEFAULT_BUDGET and _NO_BUDGET & asked.keys():
+        del search["budget"]
+    if "budget" in asked and "budget" not in search:
+        for name, filled in (("probability", PAPER_PROBABILITY), ("theta", PAPER_THETA)):
+            if search.get(name) == filled:
+                del search[name]
     for section, values in _without_none(data).items():
         if section == "area" and values:
             merged[section] = values

@@ -26,7 +26,7 @@ _ENERGY_LEFT = 1e-8  # of the maps, outside the subspace in which the atoms are 
 def learned_dictionary(
     maps: NDArray[np.float64], atoms: int, *, seed: int, progress: Progress = silent
 ) -> NDArray[np.float64]:
-    """Learn a dictionary from maps (the paper's Eq. 4, by scikit-learn's online solver).
+    """Learn a dictionary from maps (the paper's Eq. 5, by scikit-learn's online solver).
 
     The atoms lie in the span of the maps, so they are learned in the coordinates of the maps' principal
     components, which changes nothing but the time it takes.

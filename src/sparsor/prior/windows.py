@@ -67,6 +67,11 @@ class MapSet:
                 f"{self.source}: maps of shape {self.maps.shape} do not fit {len(self.row)} window rows and "
                 f"{len(self.column)} window columns"
             )
+        if len(self.maps) == 0 and not self.dropped:
+            raise FieldError(
+                f"{self.source}: not one window of {_km(*self.window_m)} fits into it: ask for smaller ones, or leave "
+                "this field out"
+            )
         if len(self.maps) == 0:
             raise FieldError(
                 f"{self.source}: no window without large gaps: {self.dropped} had more than "

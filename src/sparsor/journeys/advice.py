@@ -1,0 +1,93 @@
+"""Sentences about a planned mission, for the person who asked for it."""
+
+from __future__ import annotations
+
+from math import floor
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sparsor.geodesy.lengths import distance_m
+from sparsor.vehicle import flight_seconds
+
+if TYPE_CHECKING:
+    from sparsor.journeys.planning import PlannedMission
+
+_HARDLY_BETTER = 0.9
+_FAR_HOME = 3.0  # diagonals of the box
+
+
+def advice(mission: PlannedMission) -> tuple[str, ...]:
+    """Return what has to be said about a mission: what would make it fly, or worth flying, and likely slips."""
+    said = (_what_would_fly(mission), _what_would_help(mission), _far_home(mission))
+    return tuple(sentence for sentence in said if sentence)
+
+
+def _what_would_fly(mission: PlannedMission) -> str:
+    if mission.flyable:
+        return ""
+    start = (
+        f"A planning study, not a flight: it takes {mission.flight_time_s / 60:.0f} min in the air, the "
+        f"{mission.vehicle.name} has {mission.usable_s / 60:.0f} min less its reserve. "
+    )
+    left_s = mission.usable_s - _seconds_at_any_size(mission)
+    if left_s <= 0:
+        return start + (
+            "Climbing, dwelling, landing and the way from and to home alone take longer: shorten --hold, take off "
+            "nearer, or take a vehicle of longer endurance (--vehicle FILE.toml)."
+        )
+    shrink = left_s / (mission.flight_time_s - _seconds_at_any_size(mission))
+    box = mission.place.grid.box
+    return start + (
+        f"The same route over a box of {_down(shrink * box.east_m)} x {_down(shrink * box.north_m)} km would fit, or "
+        f"a budget of {floor(mission.usable_s / 60)}min where a route that short exists, or a vehicle of longer "
+        "endurance (--vehicle FILE.toml)."
+    )
+
+
+def _seconds_at_any_size(mission: PlannedMission) -> float:
+    """Return the part of the flight that a smaller box would not shorten."""
+    flight, plan = mission.specification.flight, mission.plan
+    transit_m = 0.0
+    if flight.home is not None:
+        ends = [plan.stops[0], plan.stops[-1]]
+        lon, lat = [stop.lon_deg for stop in ends], [stop.lat_deg for stop in ends]
+        transit_m = float(distance_m(plan.home.lon_deg, plan.home.lat_deg, lon, lat).sum())
+    return flight_seconds(
+        mission.vehicle,
+        path_length_m=0.0,
+        transit_m=transit_m,
+        stops=len(plan.stops),
+        hold_s=plan.stops[0].hold_s,
+        altitude_m=flight.altitude_m,
+        speed_m_s=flight.speed_m_s,
+    )
+
+
+def _down(metres: float) -> str:
+    """Return kilometres with two digits, rounded down: what is advised has to fit."""
+    km = metres / 1000
+    step = 10.0 ** (floor(np.log10(km)) - 1)
+    return f"{floor(km / step) * step:.3g}"
+
+
+def _what_would_help(mission: PlannedMission) -> str:
+    error = mission.expected_relative_error
+    if error < _HARDLY_BETTER:
+        return ""
+    compared = "hardly better" if error <= 1.0 else "worse"
+    return (
+        f"The expected error, {error:.2f} of the map's contrast, is {compared} than knowing the map's mean (1): allow "
+        "a larger --budget, or learn the prior from more or larger fields."
+    )
+
+
+def _far_home(mission: PlannedMission) -> str:
+    box, home = mission.place.grid.box, mission.plan.home
+    away_m = float(distance_m(home.lon_deg, home.lat_deg, box.centre_lon_deg, box.centre_lat_deg))
+    if away_m < _FAR_HOME * np.hypot(box.east_m, box.north_m):
+        return ""
+    return (
+        f"Home, {home.lon_deg:g} {home.lat_deg:g}, lies {away_m / 1000:.0f} km from the middle of the box: are "
+        "longitude and latitude swapped? The order is longitude, latitude."
+    )

@@ -1,0 +1,124 @@
+"""A mission's folder: what is in it, whether it may be written, writing it whole."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from sparsor.core.files import write_files
+from sparsor.errors import MissionError
+from sparsor.mission import export_bytes, plan_bytes
+from sparsor.mission.sidecar import Sidecar, content_hash, sidecar_npz
+from sparsor.mission.specification import read_specification, specification_toml
+from sparsor.vehicle import autopilot_named
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from sparsor.journeys.planning import PlannedMission
+    from sparsor.mission.specification import MissionSpecification
+
+SPECIFICATION_FILE = "mission.toml"
+PREVIEW_FILE = "preview.png"
+
+
+def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> None:
+    """Refuse to write over another mission, or over what this one is made from.
+
+    A folder is free when it is empty or its mission.toml asks for the same.
+
+    Raises
+    ------
+    MissionError
+    """
+    for path in (folder, *folder.parents):
+        if path.is_file():
+            raise MissionError(f"'{path}' is a file; give a folder with -o")
+    written = {(folder / file).resolve() for file in _files(spec)}
+    for path in spec.inputs:
+        if path.resolve() in written:
+            raise MissionError(
+                f"'{path}' is read for this mission and would be written over: choose another --name or -o"
+            )
+    if force or not folder.exists() or not any(folder.iterdir()):
+        return
+    if (folder / SPECIFICATION_FILE).is_file():
+        try:
+            same = read_specification(folder / SPECIFICATION_FILE) == spec
+        except MissionError:
+            same = False
+        if same:
+            return
+    raise MissionError(
+        f"'{folder}' holds something else already, or this mission with other settings: choose another --name or -o, "
+        "or write over it with --force"
+    )
+
+
+def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True) -> dict[str, Path]:
+    """Write a mission's folder, all of its files or none; return what is where.
+
+    What an earlier mission in the folder consisted of, by its mission.toml, and this one does not make, is
+    removed, so that no old route lies beside the new one.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written.
+    """
+    spec = mission.specification
+    contents = {SPECIFICATION_FILE: specification_toml(spec, folder), f"{spec.name}.plan": plan_bytes(mission.plan)}
+    for export in spec.output.export:
+        contents[f"{spec.name}.{export}"] = export_bytes(mission.plan, spec.name, export)
+    hashes = {file: content_hash(content) for file, content in contents.items() if file.endswith(".plan")}
+    contents[f"{spec.name}.npz"] = sidecar_npz(_sidecar(mission, hashes))
+    if preview:
+        from sparsor.journeys.preview import preview_png
+
+        contents[PREVIEW_FILE] = preview_png(mission)
+    inputs = {path.resolve() for path in spec.inputs}
+    stale = {folder / file for file in _files_before(folder) - contents.keys()}
+    write_files(folder, contents)
+    for path in stale:
+        if path.resolve() not in inputs:
+            path.unlink(missing_ok=True)
+    return {file: folder / file for file in contents}
+
+
+def _files(spec: MissionSpecification) -> set[str]:
+    """Return the names of the files that a mission consists of."""
+    suffixes = ("plan", "npz", *spec.output.export)
+    return {SPECIFICATION_FILE, PREVIEW_FILE, *(f"{spec.name}.{suffix}" for suffix in suffixes)}
+
+
+def _files_before(folder: Path) -> set[str]:
+    """Return the names of the files of the mission that is in a folder now, by its own specification."""
+    with suppress(MissionError):
+        return _files(read_specification(folder / SPECIFICATION_FILE))
+    return set()
+
+
+def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
+    plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
+    return Sidecar(
+        name=mission.specification.name,
+        grid=mission.place.grid,
+        allowed=mission.place.allowed,
+        model=mission.prior.model,
+        phi=candidate.phi,
+        stops=candidate.stops,
+        altitude_m=flight.altitude_m,
+        hold_s=autopilot_named(flight.autopilot).written_hold_s(flight.hold_s),
+        home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
+        home_altitude_known=plan.home.altitude_known,
+        lasso_weight=mission.specification.search.lasso or mission.prior.model.lasso_weight,
+        expected={
+            "relative_error": mission.expected_relative_error,
+            "relative_error_cells": mission.expected_relative_error_cells,
+            "cost": candidate.cost,
+            "squared_error": candidate.error,
+            "path_length_cells": candidate.length_cells,
+            "incoherence": candidate.incoherence,
+        },
+        plans=hashes,
+    )

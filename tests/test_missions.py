@@ -1,0 +1,31 @@
+"""The missions that are committed reproduce themselves, and their plans have no faults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sparsor.journeys.planning import plan_mission
+from sparsor.mission import plan_faults, read_plan
+from sparsor.mission.sidecar import content_hash, read_sidecar
+from sparsor.mission.specification import read_specification
+
+MISSIONS = Path(__file__).parents[1] / "missions"
+
+
+@pytest.mark.parametrize("name", ["doha", "gulf"])
+def test_a_committed_mission_reproduces_itself(name):
+    folder = MISSIONS / name
+    sidecar = read_sidecar(folder / f"{name}.npz")
+    mission = plan_mission(read_specification(folder / "mission.toml"))
+    # Another processor may round otherwise and choose among equals: the cost says whether it is the same search.
+    assert mission.candidate.cost == pytest.approx(sidecar.expected["cost"], rel=1e-9)
+    assert mission.expected_relative_error == pytest.approx(sidecar.expected["relative_error"], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["doha", "gulf"])
+def test_a_committed_plan_is_what_its_sidecar_remembers_and_has_no_faults(name):
+    path = MISSIONS / name / f"{name}.plan"
+    assert content_hash(path.read_bytes()) == read_sidecar(path.with_suffix(".npz")).plans[path.name]
+    assert plan_faults(read_plan(path)) == []
