@@ -51,5 +51,13 @@ class MissionError(InputError):
     """A mission specification, plan or mission folder that cannot be used."""
 
 
+class LinkError(InputError):
+    """An address, a vehicle or a plan for it that cannot be the one that was meant; nothing was sent."""
+
+
+class LinkFailure(SparsorError):
+    """The link or the vehicle failed on the way: silent, lost, refused, or not holding what was sent."""
+
+
 class OutputError(SparsorError):
     """The result could not be written: the folder is read-only, full or gone."""

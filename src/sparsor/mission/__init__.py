@@ -6,7 +6,7 @@ The .plan format, frames and commands are those of docs/mission-items.md.
 from sparsor.mission.builder import build_mission, flight_time_s
 from sparsor.mission.describe import PlanDescription, describe_plan
 from sparsor.mission.exports import FORMATS, export_bytes
-from sparsor.mission.faults import plan_faults
+from sparsor.mission.faults import Fault, judged_faults, plan_faults
 from sparsor.mission.fence import fence_around
 from sparsor.mission.items import MissionItem
 from sparsor.mission.plan import Circle, ComplexItem, Fence, Home, MissionPlan, RallyPoint
@@ -17,6 +17,7 @@ __all__ = [
     "FORMATS",
     "Circle",
     "ComplexItem",
+    "Fault",
     "Fence",
     "Home",
     "MissionItem",
@@ -28,6 +29,7 @@ __all__ = [
     "export_bytes",
     "fence_around",
     "flight_time_s",
+    "judged_faults",
     "parse_plan",
     "plan_bytes",
     "plan_faults",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from shapely import Point, Polygon
@@ -14,6 +15,7 @@ from sparsor.mission.items import (
     FRAME_TERRAIN,
     LANDINGS,
     NAV_RETURN_TO_LAUNCH,
+    POSITION_OPTIONAL,
     TAKE_OFFS,
     WAYPOINTS,
 )
@@ -27,44 +29,70 @@ FLIES = frozenset({1, 2, 3, 4, 13, 14, 15, *range(19, 26)})  # MAV_TYPE of what 
 COMMON_CEILING_M = 120.0
 
 
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong with a plan.
+
+    Parameters
+    ----------
+    sentence : str
+    serious : bool
+        Whether the plan must not be sent to a vehicle like this; what is not serious has to be known.
+    """
+
+    sentence: str
+    serious: bool = False
+
+
 def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
     """Return a sentence for each fault noticed; none means that none was noticed, not that there is none."""
+    return tuple(fault.sentence for fault in judged_faults(plan))
+
+
+def judged_faults(plan: MissionPlan) -> tuple[Fault, ...]:
+    """Return each fault noticed, with whether it is serious."""
     return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *_fenced(plan))
 
 
-def _order(plan: MissionPlan) -> Iterator[str]:
+def _order(plan: MissionPlan) -> Iterator[Fault]:
     flown = [item for item in plan.items if item.command in FLOWN_TO]
     if not flown:
-        yield "There is no item with a position: nothing is flown."
+        yield Fault("There is no item with a position: nothing is flown.", serious=True)
         return
     if plan.vehicle_type in FLIES and flown[0].command not in TAKE_OFFS:
-        yield "The first item with a position is not a take-off: a vehicle on the ground will not fly this."
+        yield Fault("The first item with a position is not a take-off: a vehicle on the ground will not fly this.")
     last = plan.items[-1].command
     if last == NAV_RETURN_TO_LAUNCH:
-        yield (
+        yield Fault(
             "The plan ends with a return to launch: a straight line home from the last waypoint, through "
             "whatever is there."
         )
     elif plan.vehicle_type in FLIES and not any(item.command in LANDINGS for item in plan.items):
-        yield "The plan neither lands nor returns."
+        yield Fault("The plan neither lands nor returns.")
 
 
-def _positions(plan: MissionPlan) -> Iterator[str]:
+def _positions(plan: MissionPlan) -> Iterator[Fault]:
     for place, item in enumerate(plan.items, start=1):
         if item.command not in FLOWN_TO:
             continue
         if not item.has_position:
-            yield f"Item {place} (command {item.command}) has no position: readers write 0/0 for it."
+            px4 = plan.autopilot is not None and plan.autopilot.name == "px4"  # ArduPilot reads 0/0 as "here"
+            yield Fault(f"Item {place} (command {item.command}) has no position: readers write 0/0 for it.", px4)
         elif item.lat_deg == 0 and item.lon_deg == 0:
-            yield f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'."
+            yield Fault(
+                f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'.",
+                serious=item.command not in POSITION_OPTIONAL,
+            )
         if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
-            yield f"Item {place} is a waypoint {item.altitude_m:g} m above home."
+            yield Fault(f"Item {place} is a waypoint {item.altitude_m:g} m above home.")
     heights = [item.altitude_m for item in plan.items if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE]
     if heights and max(heights) > COMMON_CEILING_M:
-        yield (f"The highest waypoint is {max(heights):g} m above home; {COMMON_CEILING_M:g} m is a common ceiling.")
+        yield Fault(
+            f"The highest waypoint is {max(heights):g} m above home; {COMMON_CEILING_M:g} m is a common ceiling."
+        )
 
 
-def _limits(plan: MissionPlan) -> Iterator[str]:
+def _limits(plan: MissionPlan) -> Iterator[Fault]:
     facts = plan.autopilot
     if facts is None:
         return
@@ -75,38 +103,42 @@ def _limits(plan: MissionPlan) -> Iterator[str]:
     )
     for what, count, most in counts:
         if count > most:
-            yield f"{count} {what} are more than the {most} that {facts.title} stores."
+            yield Fault(f"{count} {what} are more than the {most} that {facts.title} stores.", serious=True)
     fractions = sum(item.command in WAYPOINTS and item.hold_s % 1 != 0 for item in plan.items)
     if facts.whole_second_holds and fractions:
-        yield f"{fractions} waypoints hold for a fraction of a second, which {facts.title} drops."
+        yield Fault(f"{fractions} waypoints hold for a fraction of a second, which {facts.title} drops.")
 
 
-def _frames(plan: MissionPlan) -> Iterator[str]:
+def _frames(plan: MissionPlan) -> Iterator[Fault]:
     if plan.autopilot is None or plan.autopilot.name != "px4":
         return
     for place, item in enumerate(plan.items, start=1):
         without_position = item.command in (NAV_RETURN_TO_LAUNCH, DO_CHANGE_SPEED)
         if without_position and item.frame != FRAME_MISSION:
-            yield f"Item {place} (command {item.command}) is in frame {item.frame}; PX4 takes only frame 2."
+            yield Fault(
+                f"Item {place} (command {item.command}) is in frame {item.frame}; PX4 takes only frame 2.", True
+            )
         elif item.frame == FRAME_TERRAIN:
-            yield f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses."
+            yield Fault(f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses.", True)
 
 
-def _fenced(plan: MissionPlan) -> Iterator[str]:
+def _fenced(plan: MissionPlan) -> Iterator[Fault]:
     if not plan.fences and not plan.circles:
-        yield "There is no fence."
+        yield Fault("There is no fence.")
     places = {"Home": (plan.home.lon_deg, plan.home.lat_deg)}
     for place, item in enumerate(plan.items, start=1):
-        if item.has_position:
+        here = item.command in POSITION_OPTIONAL and item.params[4:6] == (0.0, 0.0)
+        if item.has_position and not here:
             places[f"Item {place}"] = (item.lon_deg, item.lat_deg)
     for number, fence in enumerate(plan.fences, start=1):
         area = _plane(fence)
         if not area.is_valid:
-            yield f"Fence polygon {number} crosses itself."
+            yield Fault(f"Fence polygon {number} crosses itself.", serious=True)
             continue
         for name, (lon, lat) in places.items():
             if area.contains(Point(_near(lon, fence.lon_deg[0]), lat)) != fence.inclusion:
-                yield f"{name} lies {'outside' if fence.inclusion else 'inside'} fence polygon {number}."
+                side = "outside" if fence.inclusion else "inside"
+                yield Fault(f"{name} lies {side} fence polygon {number}.", serious=True)
 
 
 def _plane(fence: Fence) -> Polygon:
