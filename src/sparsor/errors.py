@@ -55,7 +55,7 @@ class LinkError(InputError):
     """An address, a vehicle or a plan for it that cannot be the one that was meant; nothing was sent."""
 
 
-class LinkFailure(SparsorError):
+class LinkFailureError(SparsorError):
     """The link or the vehicle failed on the way: silent, lost, refused, or not holding what was sent."""
 
 

@@ -11,7 +11,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from link.vehicle_endpoint import PX4, Vehicle, VehicleEndpoint
-from sparsor.errors import InputError, LinkError, LinkFailure
+from sparsor.errors import InputError, LinkError, LinkFailureError
 from sparsor.link.connection import Connection
 from sparsor.link.recorder import record
 from sparsor.link.tlog import TlogWriter
@@ -59,7 +59,7 @@ def test_several_vehicles_ask_for_a_choice():
         with pytest.raises(LinkError, match=r"system 1.*system 7.*--system"):
             find_vehicle(connection)
         assert find_vehicle(connection, 7).system_id == 7
-        with pytest.raises(LinkFailure, match=r"system 3 was not heard.*system 1"):
+        with pytest.raises(LinkFailureError, match=r"system 3 was not heard.*system 1"):
             find_vehicle(connection, 3, timeout_s=0.6)
 
 
@@ -74,7 +74,7 @@ def test_several_vehicles_ask_for_a_choice():
 def test_a_link_without_a_vehicle_says_what_it_heard_within_the_timeout(vehicle, words):
     with VehicleEndpoint(vehicle) as endpoint, Connection(endpoint.url) as connection:
         begun = time.monotonic()
-        with pytest.raises(LinkFailure, match=words):
+        with pytest.raises(LinkFailureError, match=words):
             find_vehicle(connection, timeout_s=0.7)
         assert time.monotonic() - begun < 1.2
 
@@ -84,7 +84,7 @@ def test_a_taken_port_a_closed_one_and_an_unknown_host_are_named():
         taken = endpoint.socket.getsockname()[1]
         with pytest.raises(LinkError, match=f"port {taken} is taken"):
             Connection(f"udpin://127.0.0.1:{taken}")
-    with pytest.raises(LinkFailure, match="nobody answers at tcpout"):
+    with pytest.raises(LinkFailureError, match="nobody answers at tcpout"):
         Connection(f"tcpout://127.0.0.1:{free_port()}", timeout_s=1)
     with pytest.raises(LinkError, match="no host"):
         Connection("udpout://no.such.host.invalid:14550")
@@ -101,11 +101,11 @@ def test_a_tcp_link_works_and_its_end_is_noticed():
             client.sendall(beat[:9])
             time.sleep(0.05)
             client.sendall(beat[9:])
-            assert next(inbox.until(time.monotonic() + 2)).frame.raw == bytes(beat)
+            assert next(inbox.until(time.monotonic() + 20)).frame.raw == bytes(beat)
         client.close()
         gone = "closed the connection|connection broke"
-        with pytest.raises(LinkFailure, match=gone), connection.inbox("HEARTBEAT") as inbox:
-            list(inbox.until(time.monotonic() + 3))
+        with pytest.raises(LinkFailureError, match=gone), connection.inbox("HEARTBEAT") as inbox:
+            list(inbox.until(time.monotonic() + 2))
     server.close()
 
 
@@ -116,7 +116,7 @@ def test_a_vehicle_may_connect_to_us_leave_and_come_back():
             beat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3).pack(mavlink.MAVLink(None, system))
             with connection.inbox("HEARTBEAT") as inbox, socket.create_connection(("127.0.0.1", port)) as client:
                 client.sendall(beat)
-                assert next(inbox.until(time.monotonic() + 3)).frame.system_id == system
+                assert next(inbox.until(time.monotonic() + 20)).frame.system_id == system
 
 
 def test_every_frame_of_both_directions_is_in_the_tlog(tmp_path):
@@ -128,9 +128,9 @@ def test_every_frame_of_both_directions_is_in_the_tlog(tmp_path):
             sender = mavlink.MAVLink_named_value_float_message(1, b"NO2", 1.5)
             for _ in range(50):
                 endpoint.send(sender)
-            connection.send(mavlink.MAVLink_param_request_read_message(1, 1, b"FENCE_ENABLE", -1))
             with connection.inbox("PARAM_VALUE") as inbox:
-                assert next(inbox.until(time.monotonic() + 2)).message.param_id == "FENCE_ENABLE"
+                connection.send(mavlink.MAVLink_param_request_read_message(1, 1, b"FENCE_ENABLE", -1))
+                assert next(inbox.until(time.monotonic() + 20)).message.param_id == "FENCE_ENABLE"
             time.sleep(0.2)
             during = len(frames_of(path))  # before it is closed: a crash loses nothing
         sent = list(endpoint.sent)
@@ -172,7 +172,7 @@ def test_record_sends_nothing_when_it_only_listens(tmp_path):
 def test_record_says_when_nothing_comes_and_keeps_an_older_file(tmp_path):
     path = tmp_path / "r.tlog"
     url = f"udpin://127.0.0.1:{free_port()}"
-    with pytest.raises(LinkFailure, match="nothing came"):
+    with pytest.raises(LinkFailureError, match="nothing came"):
         record(url, path, seconds=5, timeout_s=0.3)
     assert not path.exists()
     path.write_bytes(b"older")

@@ -11,7 +11,7 @@ import pytest
 
 from link.vehicle_endpoint import ARDUPILOT, PX4, Vehicle, VehicleEndpoint
 from mission_strategies import example_plan
-from sparsor.errors import InputError, LinkError, LinkFailure, MissionError
+from sparsor.errors import InputError, LinkError, LinkFailureError, MissionError
 from sparsor.journeys.uploading import choose_plan, upload_mission
 from sparsor.link.checks import check_plan
 from sparsor.link.connection import Connection
@@ -146,7 +146,7 @@ def test_a_refused_or_spoiled_transfer_names_what_the_vehicle_is_left_with(wrong
     vehicle = Vehicle(**wrong)
     plan = example_plan(stops=4)
     plan = dataclasses.replace(plan, items=(plan.items[0], *plan.items[2:]))  # so that item 2 is a waypoint
-    with pytest.raises(LinkFailure, match=words) as failed:
+    with pytest.raises(LinkFailureError, match=words) as failed:
         uploaded(vehicle, plan)
     assert failed.value.exit_code == 1
     assert vehicle.stored == {0: [], 1: [], 2: []}
@@ -157,7 +157,7 @@ def test_the_old_plan_is_back_after_a_refusal():
     uploaded(vehicle, example_plan(stops=3))
     before = {kind: held(vehicle, kind) for kind in (MISSION, RALLY)}
     vehicle.room = 10
-    with pytest.raises(LinkFailure, match="old plan again"):
+    with pytest.raises(LinkFailureError, match="old plan again"):
         uploaded(vehicle, example_plan(stops=12))
     assert {kind: held(vehicle, kind)[1:] for kind in before} == {kind: items[1:] for kind, items in before.items()}
 
@@ -166,7 +166,7 @@ def test_a_link_that_dies_leaves_the_state_unknown(monkeypatch):
     monkeypatch.setattr("sparsor.link.resending.SILENT_S", 1.5)
     monkeypatch.setattr("sparsor.link.upload.LIFE_S", 0.6)
     begun = time.monotonic()
-    with pytest.raises(LinkFailure, match="state unknown, do not arm"):
+    with pytest.raises(LinkFailureError, match="state unknown, do not arm"):
         uploaded(Vehicle(dies_at=4))
     assert time.monotonic() - begun < 15
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,12 @@ from sparsor import __version__
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
 from sparsor.cli.plan import plan
+from sparsor.cli.record import record
+from sparsor.cli.simulate import simulate
+from sparsor.cli.upload import upload
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 app = typer.Typer(
     name="sparsor",
@@ -22,15 +28,22 @@ app = typer.Typer(
 app.command("plan")(plan)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
+app.command("upload")(upload)
+app.command("record")(record)
+app.command("simulate")(simulate)
 
-_generate_mission = typer.Typer(
-    name="generate-mission",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-_generate_mission.command()(plan)
+
+def _alone(name: str, command: Callable[..., None]) -> typer.Typer:
+    """Return a program of one command, for those that people type most under their own names."""
+    program = typer.Typer(
+        name=name,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    program.command()(command)
+    return program
 
 
 def _print_version(asked: bool) -> None:
@@ -56,4 +69,9 @@ def main() -> None:
 
 def generate_mission() -> None:
     """Run `generate-mission`, which is `sparsor plan`."""
-    _generate_mission()
+    _alone("generate-mission", plan)()
+
+
+def upload_mission() -> None:
+    """Run `upload-mission`, which is `sparsor upload`."""
+    _alone("upload-mission", upload)()

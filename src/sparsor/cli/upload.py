@@ -59,7 +59,7 @@ def upload(
             progress=progress,
             found=lambda vehicle: None if talk is Talk.QUIET else typer.echo(f"found {vehicle.words}", err=True),
         )
-    warn(report.warnings, talk)
+    warn(report.warnings)
     if as_json:
         print_json(_contents(report))
     elif quiet:

@@ -57,7 +57,7 @@ def upload_mission(
     ------
     InputError
         When the plan, the address or the vehicle is not one that this can be done with; nothing was sent.
-    LinkFailure
+    LinkFailureError
         When the vehicle is silent or the transfer fails.
     """
     plan = read_plan(choose_plan(path, sortie))

@@ -58,7 +58,7 @@ def far_from_home(plan: MissionPlan, vehicle: FoundVehicle, connection: Connecti
 
     Raises
     ------
-    LinkFailure
+    LinkFailureError
         When the link is gone.
     """
     place = _position(vehicle, connection)

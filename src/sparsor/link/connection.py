@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Final, Self
 
 from sparsor.core.mavlink_frames import Frame, FrameReader
-from sparsor.errors import LinkFailure, SparsorError
+from sparsor.errors import LinkFailureError, SparsorError
 from sparsor.link.addresses import Address, parse_address
 from sparsor.link.endpoints import open_endpoint
 from sparsor.link.inbox import Inbox, Message, Received
@@ -42,7 +42,7 @@ class Connection:
 
     Raises
     ------
-    LinkError, LinkFailure
+    LinkError, LinkFailureError
         As `open_endpoint`.
 
     Attributes
@@ -93,7 +93,7 @@ class Connection:
         self._endpoint.close()
 
     def check(self) -> None:
-        """Raise LinkFailure, or what the recording raised, when the link is gone."""
+        """Raise LinkFailureError, or what the recording raised, when the link is gone."""
         if self.failure is not None:
             raise self.failure
 
@@ -122,7 +122,7 @@ class Connection:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the link is gone.
         """
         with self._sending:
@@ -188,9 +188,9 @@ class Connection:
             return ardupilotmega.MAVLink_bad_data(frame.raw, str(error))
 
 
-def lost(connection: Connection, system_id: int, after_s: float) -> LinkFailure | None:
+def lost(connection: Connection, system_id: int, after_s: float) -> LinkFailureError | None:
     """Return why a vehicle counts as gone: the link broke, or nothing came for `after_s` seconds; else None."""
     if connection.failure is not None:
-        return LinkFailure(str(connection.failure))
+        return LinkFailureError(str(connection.failure))
     silent_s = connection.silent_s(system_id)
-    return LinkFailure(f"vehicle {system_id} has been silent for {silent_s:.0f} s") if silent_s > after_s else None
+    return LinkFailureError(f"vehicle {system_id} has been silent for {silent_s:.0f} s") if silent_s > after_s else None

@@ -7,7 +7,7 @@ import select
 import socket
 from typing import TYPE_CHECKING, Final
 
-from sparsor.errors import LinkFailure
+from sparsor.errors import LinkFailureError
 from sparsor.link.sockets import bound, resolved
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class UdpIn:
         except (TimeoutError, ConnectionError):  # Windows reports a sender that closed its port as a reset
             return b""
         except OSError as error:
-            raise LinkFailure(f"the link broke: {error.strerror or error}") from error
+            raise LinkFailureError(f"the link broke: {error.strerror or error}") from error
         self._senders[sender] = None
         return data
 
@@ -67,7 +67,7 @@ class UdpOut:
             if error.errno in (errno.EINVAL, getattr(errno, "WSAEINVAL", -1)):  # not bound before the first send
                 select.select([], [], [], timeout_s)
                 return b""
-            raise LinkFailure(f"the link broke: {error.strerror or error}") from error
+            raise LinkFailureError(f"the link broke: {error.strerror or error}") from error
 
     def send(self, data: bytes) -> None:
         """Send to the host; a host that is out of reach is no error, it may come back."""

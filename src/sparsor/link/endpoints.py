@@ -16,11 +16,11 @@ class Endpoint(Protocol):
     """One open link."""
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what has come, b"" when nothing did in time; LinkFailure when the other side is gone."""
+        """Return what has come, b"" when nothing did in time; LinkFailureError when the other side is gone."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Send to whoever is there; nothing happens while nobody is. LinkFailure when the link is gone."""
+        """Send to whoever is there; nothing happens while nobody is. LinkFailureError when the link is gone."""
         ...
 
     def close(self) -> None:
@@ -35,7 +35,7 @@ def open_endpoint(address: Address, timeout_s: float) -> Endpoint:
     ------
     LinkError
         When the port is taken, the host or device unknown.
-    LinkFailure
+    LinkFailureError
         When nobody answers at the other side.
     """
     if address.kind == "serial":

@@ -59,7 +59,7 @@ class Inbox:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the link is gone.
         """
         while True:

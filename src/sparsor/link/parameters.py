@@ -21,7 +21,7 @@ def read_parameter(connection: Connection, vehicle: FoundVehicle, name: str) -> 
 
     Raises
     ------
-    LinkFailure
+    LinkFailureError
         When the link is gone.
     """
     from pymavlink.dialects.v20 import ardupilotmega as mavlink

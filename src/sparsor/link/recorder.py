@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from sparsor.core.progress import silent
-from sparsor.errors import LinkFailure
+from sparsor.errors import LinkFailureError
 from sparsor.link.addresses import parse_address
 from sparsor.link.connection import Connection
 from sparsor.link.tlog import TlogWriter
@@ -87,7 +87,7 @@ def record(
     ------
     LinkError
         When the address or the file cannot be used.
-    LinkFailure
+    LinkFailureError
         When nothing comes, or the link breaks; what came until then is in the file.
     """
     address = parse_address(url)
@@ -113,7 +113,7 @@ def request_streams(connection: Connection, vehicle: FoundVehicle) -> None:
 
     Raises
     ------
-    LinkFailure
+    LinkFailureError
         When the link is gone.
     """
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -144,7 +144,7 @@ def _watch(
                             request_streams(connection, vehicle)
                 connection.check()
                 if connection.frames_received == 0 and now_s - begun_s > timeout_s:
-                    raise LinkFailure(f"nothing came from {connection.address.url} within {timeout_s:g} s")
+                    raise LinkFailureError(f"nothing came from {connection.address.url} within {timeout_s:g} s")
                 if math.isfinite(end_s):
                     progress("record", round(now_s - begun_s), round(end_s - begun_s))
     except KeyboardInterrupt:

@@ -11,7 +11,7 @@ import time
 from typing import TYPE_CHECKING, Any, Final
 
 from sparsor.core.progress import silent
-from sparsor.errors import LinkFailure
+from sparsor.errors import LinkFailureError
 from sparsor.link.connection import lost
 from sparsor.link.wire import KINDS, WireItem
 
@@ -61,7 +61,7 @@ class Resender:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the vehicle refuses, or is gone.
         """
         begin = self._mavlink.MAVLink_mission_count_message(*self._target, len(items), kind)
@@ -91,14 +91,14 @@ class Resender:
                     answer = self._item(kind, last, items[last])
                     self._send(answer)
                     progress(f"send {KINDS[kind]}", last, len(items))
-        raise LinkFailure(f"sending {KINDS[kind]} failed: the vehicle stopped asking at item {last + 1}")
+        raise LinkFailureError(f"sending {KINDS[kind]} failed: the vehicle stopped asking at item {last + 1}")
 
     def download(self, kind: int) -> tuple[WireItem, ...]:
         """Return what the vehicle holds of a MAV_MISSION_TYPE.
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When it does not answer.
         """
         count, got = -1, dict[int, WireItem]()
@@ -112,7 +112,7 @@ class Resender:
                     self._request(kind, wanted)
                     resent, due_s = resent + 1, time.monotonic() + self._resend_s
                 if resent > PATIENCE:
-                    raise LinkFailure(f"reading its {KINDS[kind]} failed: the vehicle does not answer")
+                    raise LinkFailureError(f"reading its {KINDS[kind]} failed: the vehicle does not answer")
                 received = next(inbox.until(due_s), None)
                 if received is None or received.message.mission_type != kind:
                     continue
@@ -140,7 +140,7 @@ class Resender:
         if result == INVALID_SEQUENCE or result in NOT_RECEIVING:
             return all_asked and resent > 0
         why = "it has no room for so many" if result == NO_SPACE else f"refused with MAV_MISSION_RESULT {result}"
-        raise LinkFailure(f"sending {KINDS[kind]} failed: {why}")
+        raise LinkFailureError(f"sending {KINDS[kind]} failed: {why}")
 
     def _item(self, kind: int, number: int, item: WireItem) -> Any:  # noqa: ANN401 # pymavlink has no types
         return self._mavlink.MAVLink_mission_item_int_message(

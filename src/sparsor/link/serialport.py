@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Final
 
-from sparsor.errors import LinkError, LinkFailure
+from sparsor.errors import LinkError, LinkFailureError
 
 if TYPE_CHECKING:
     from sparsor.link.addresses import Address
@@ -40,14 +40,14 @@ class SerialEndpoint:
             waiting = self._port.in_waiting if first else 0
             return first + bytes(self._port.read(waiting)) if waiting else first
         except OSError as error:
-            raise LinkFailure(f"the serial port is gone: {error}") from error
+            raise LinkFailureError(f"the serial port is gone: {error}") from error
 
     def send(self, data: bytes) -> None:
         """Send all of it."""
         try:
             self._port.write(data)
         except OSError as error:
-            raise LinkFailure(f"the serial port is gone: {error}") from error
+            raise LinkFailureError(f"the serial port is gone: {error}") from error
 
     def close(self) -> None:
         """Close the port."""

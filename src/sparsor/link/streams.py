@@ -6,7 +6,7 @@ import select
 import socket
 from typing import TYPE_CHECKING, Final
 
-from sparsor.errors import LinkError, LinkFailure
+from sparsor.errors import LinkError, LinkFailureError
 from sparsor.link.sockets import bound
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class TcpOut:
         except socket.gaierror as error:
             raise LinkError(f"'{address.url}': there is no host '{address.place}' ({error.strerror})") from error
         except OSError as error:
-            raise LinkFailure(
+            raise LinkFailureError(
                 f"nobody answers at {address.url}: {error.strerror or error}. Is the autopilot running, "
                 "and is this its port (SITL's is 5760)?"
             ) from error
@@ -60,10 +60,10 @@ class TcpIn:
             except TimeoutError:
                 return b""
             except OSError as error:
-                raise LinkFailure(f"the link broke: {error.strerror or error}") from error
+                raise LinkFailureError(f"the link broke: {error.strerror or error}") from error
         try:
             return _receive(self._client, timeout_s)
-        except LinkFailure:
+        except LinkFailureError:
             self._leave()
             return b""
 
@@ -73,7 +73,7 @@ class TcpIn:
         if client is not None:
             try:
                 _send(client, data)
-            except LinkFailure:
+            except LinkFailureError:
                 return
 
     def close(self) -> None:
@@ -94,9 +94,9 @@ def _receive(connection: socket.socket, timeout_s: float) -> bytes:
             return b""
         data = connection.recv(BUFFER)
     except (OSError, ValueError) as error:
-        raise LinkFailure(f"the connection broke: {error}") from error
+        raise LinkFailureError(f"the connection broke: {error}") from error
     if not data:
-        raise LinkFailure("the other side closed the connection")
+        raise LinkFailureError("the other side closed the connection")
     return data
 
 
@@ -104,4 +104,4 @@ def _send(connection: socket.socket, data: bytes) -> None:
     try:
         connection.sendall(data)
     except OSError as error:
-        raise LinkFailure(f"the connection broke: {error.strerror or error}") from error
+        raise LinkFailureError(f"the connection broke: {error.strerror or error}") from error

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from sparsor.core.mavlink_frames import FrameReader
 from sparsor.core.progress import silent
-from sparsor.errors import LinkFailure, SparsorError
+from sparsor.errors import LinkFailureError, SparsorError
 from sparsor.link.connection import lost
 from sparsor.link.resending import Resender
 from sparsor.link.wire import FENCE, KINDS, MISSION, RALLY, WireItem
@@ -43,7 +43,7 @@ REASONS: Final = {
 LINKS_FAULT: Final = frozenset({"TIMEOUT", "INVALID_SEQUENCE", "PROTOCOL_ERROR", "ERROR", "TRANSFER_CANCELLED"})
 
 
-class Unheard(LinkFailure):
+class UnheardError(LinkFailureError):
     """mavsdk gave up on the link; we have not yet."""
 
 
@@ -62,7 +62,7 @@ class Transfer:
 
     Raises
     ------
-    LinkFailure
+    LinkFailureError
         When mavsdk does not see it.
 
     Attributes
@@ -108,7 +108,7 @@ class Transfer:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the vehicle refuses or is gone.
         """
         if not items:
@@ -118,7 +118,7 @@ class Transfer:
         progress(f"send {KINDS[kind]}", 0, len(items))
         try:
             self._upload(kind, wanted, progress)
-        except Unheard:
+        except UnheardError:
             self.helped.add(KINDS[kind])
             self._resender.upload(kind, items, progress)
         progress(f"send {KINDS[kind]}", len(items), len(items))
@@ -128,12 +128,12 @@ class Transfer:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the vehicle does not answer.
         """
         try:
             return self._download(kind)
-        except Unheard:
+        except UnheardError:
             self.helped.add(KINDS[kind])
             return self._resender.download(kind)
 
@@ -160,7 +160,7 @@ class Transfer:
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the vehicle does not accept it.
         """
         from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -175,15 +175,17 @@ class Transfer:
                         continue
                     if answer.message.type == mavlink.MAV_MISSION_ACCEPTED:
                         return
-                    raise LinkFailure(f"the vehicle does not clear its {KINDS[kind]} (result {answer.message.type})")
-        raise LinkFailure(f"the vehicle does not answer when asked to clear its {KINDS[kind]}")
+                    raise LinkFailureError(
+                        f"the vehicle does not clear its {KINDS[kind]} (result {answer.message.type})"
+                    )
+        raise LinkFailureError(f"the vehicle does not answer when asked to clear its {KINDS[kind]}")
 
     def set_current(self, item: int) -> None:
         """Make an item the next to be flown; asked again where the answer is lost.
 
         Raises
         ------
-        LinkFailure
+        LinkFailureError
             When the vehicle does not accept it.
         """
         for left in reversed(range(TRIES)):
@@ -192,7 +194,7 @@ class Transfer:
                     f"setting the current item to {item}",
                     lambda done: self._plugin.set_current_mission_item_async(item, lambda result, _: done(result)),
                 )
-            except Unheard:
+            except UnheardError:
                 if not left:
                     raise
             else:
@@ -207,7 +209,7 @@ class Transfer:
         system = self._mavsdk.first_autopilot(timeout_s)
         if system is None:
             self._connection.check()
-            raise LinkFailure(f"{self._vehicle.words} fell silent before the transfer began")
+            raise LinkFailureError(f"{self._vehicle.words} fell silent before the transfer began")
         return system
 
     def _upload(self, kind: int, wanted: list[Any], progress: Progress) -> None:
@@ -244,10 +246,10 @@ class Transfer:
         while not ended.wait(0.1):
             gone = lost(self._connection, self._vehicle.system_id, SILENT_S)
             if gone is not None:
-                raise LinkFailure(f"{gone}, while {doing}")
+                raise LinkFailureError(f"{gone}, while {doing}")
         name = str(results[0].name)
         if name != "SUCCESS" and name not in allowed:
-            raise (Unheard if name in LINKS_FAULT else LinkFailure)(
+            raise (UnheardError if name in LINKS_FAULT else LinkFailureError)(
                 f"{doing} failed: {REASONS.get(name, name.replace('_', ' ').lower())} ({name})"
             )
 

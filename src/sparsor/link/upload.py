@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from sparsor.core.progress import silent
-from sparsor.errors import LinkFailure, SparsorError
+from sparsor.errors import LinkFailureError, SparsorError
 from sparsor.link.checks import above_the_fence, check_plan, far_from_home
 from sparsor.link.parameters import fence_ceiling_m, fence_enforced
 from sparsor.link.readback import differences, summary
@@ -93,7 +93,7 @@ def upload_plan(
     ------
     LinkError
         When the plan must not go to this vehicle; nothing was sent.
-    LinkFailure
+    LinkFailureError
         When the link or the transfer failed; says what the vehicle holds now.
     """
     warnings = [*check_plan(plan, vehicle, force=force), *far_from_home(plan, vehicle, connection)]
@@ -140,13 +140,13 @@ def _send_or_restore(
             transfer.upload(kind, items[kind], progress)
         transfer.set_current(0)
         return _verified(transfer, items, facts, progress)
-    except LinkFailure as error:
+    except LinkFailureError as error:
         state = UNKNOWN if gone() else _restored(transfer, held, facts)
-        raise LinkFailure(f"{error}. The vehicle: {state}") from error
+        raise LinkFailureError(f"{error}. The vehicle: {state}") from error
     except KeyboardInterrupt as interrupt:
         transfer.cancel()
         state = UNKNOWN if gone() else _restored(transfer, held, facts)
-        raise LinkFailure(f"interrupted. The vehicle: {state}") from interrupt
+        raise LinkFailureError(f"interrupted. The vehicle: {state}") from interrupt
 
 
 def _verified(transfer: Transfer, items: Items, facts: Autopilot, progress: Progress) -> tuple[str, ...]:
@@ -158,7 +158,7 @@ def _verified(transfer: Transfer, items: Items, facts: Autopilot, progress: Prog
     harmful = [one.sentence for one in found if not one.harmless]
     if harmful:
         more = f" (and {len(harmful) - 3} more)" if len(harmful) > 3 else ""
-        raise LinkFailure("the vehicle holds another plan than was sent: " + " ".join(harmful[:3]) + more)
+        raise LinkFailureError("the vehicle holds another plan than was sent: " + " ".join(harmful[:3]) + more)
     return tuple(summary(found))
 
 
@@ -168,11 +168,11 @@ def _restored(transfer: Transfer, held: Mapping[int, tuple[WireItem, ...]], fact
         for kind in KINDS:
             transfer.upload(kind, held[kind])
         _verified(transfer, dict(held), facts, silent)
-    except LinkFailure:
+    except LinkFailureError:
         try:
             for kind in (MISSION, FENCE, RALLY):
                 transfer.clear(kind)
-        except LinkFailure:
+        except LinkFailureError:
             return UNKNOWN
         return "the new plan was cleared, it holds none now"
     return "it holds its old plan again" if held[MISSION] else "it holds no plan, as before"

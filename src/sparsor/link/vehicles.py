@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sparsor.errors import LinkError, LinkFailure
+from sparsor.errors import LinkError, LinkFailureError
 from sparsor.mission.describe import VEHICLES
 from sparsor.mission.plan import TITLES
 from sparsor.vehicle import AUTOPILOTS
@@ -93,7 +93,7 @@ def find_vehicle(connection: Connection, system_id: int | None = None, timeout_s
     ------
     LinkError
         When several vehicles are there and none was asked for.
-    LinkFailure
+    LinkFailureError
         When none is heard, or not the one asked for; says what was heard.
     """
     found: dict[int, FoundVehicle] = {}
@@ -124,22 +124,22 @@ def _silence(
     timeout_s: float,
     found: dict[int, FoundVehicle],
     others: set[int],
-) -> LinkFailure:
+) -> LinkFailureError:
     url, kind = connection.address.url, connection.address.kind
     if found:
         listed = "; ".join(found[number].words for number in sorted(found))
-        return LinkFailure(f"system {system_id} was not heard on {url} within {timeout_s:g} s; there is {listed}")
+        return LinkFailureError(f"system {system_id} was not heard on {url} within {timeout_s:g} s; there is {listed}")
     if others:
         listed = ", ".join(str(number) for number in sorted(others))
-        return LinkFailure(
+        return LinkFailureError(
             f"no autopilot was heard on {url} within {timeout_s:g} s, only system {listed} without one "
             "(a ground station, radio or companion). Is the vehicle on and in range?"
         )
     if connection.frames_received:
-        return LinkFailure(f"MAVLink comes from {url}, but no HEARTBEAT of an autopilot within {timeout_s:g} s")
+        return LinkFailureError(f"MAVLink comes from {url}, but no HEARTBEAT of an autopilot within {timeout_s:g} s")
     if connection.bytes_received:
         wrong = "the baud rate is wrong, or it" if kind == "serial" else "it"
-        return LinkFailure(
+        return LinkFailureError(
             f"{connection.bytes_received} bytes came from {url} in {timeout_s:g} s, but no MAVLink: {wrong} is the "
             "port of something else"
         )
@@ -149,4 +149,4 @@ def _silence(
         "serial": "Is this the autopilot's port, and its baud rate (57600 for radios, 115200 for USB)?",
     }
     hint = hints.get(kind, "Is this the autopilot's port?")
-    return LinkFailure(f"nothing came from {url} within {timeout_s:g} s. {hint}")
+    return LinkFailureError(f"nothing came from {url} within {timeout_s:g} s. {hint}")
