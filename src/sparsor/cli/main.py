@@ -17,14 +17,19 @@ from sparsor.cli.upload import upload
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-app = typer.Typer(
-    name="sparsor",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+
+def _program(name: str, *, no_args_is_help: bool = False) -> typer.Typer:
+    return typer.Typer(
+        name=name,
+        no_args_is_help=no_args_is_help,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+
+app = _program("sparsor", no_args_is_help=True)
 app.command("plan")(plan)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
@@ -35,13 +40,7 @@ app.command("simulate")(simulate)
 
 def _alone(name: str, command: Callable[..., None]) -> typer.Typer:
     """Return a program of one command, for those that people type most under their own names."""
-    program = typer.Typer(
-        name=name,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
+    program = _program(name)
     program.command()(command)
     return program
 

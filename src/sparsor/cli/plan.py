@@ -19,9 +19,9 @@ from sparsor.cli.console import (
     reporting,
     warn,
 )
+from sparsor.cli.summary import mission_rows, mission_values
 
 if TYPE_CHECKING:
-    from sparsor.journeys.planning import PlannedMission
     from sparsor.mission.specification import MissionSpecification
 
 WHERE, PRIOR, SEARCH, FLIGHT, OUTPUT = "Where", "What maps look like", "Search", "Flight", "Output"
@@ -237,7 +237,7 @@ def plan(
     with progress_bar(talk) as progress:
         mission = plan_mission(spec, workers=workers, progress=progress)
     written = write_mission(mission, folder)
-    result = _result(mission, folder)
+    result = mission_values(mission, folder)
     if as_json:
         print_json(result)
         return
@@ -246,7 +246,7 @@ def plan(
     if talk is Talk.QUIET:
         typer.echo(written[f"{spec.name}.plan"])
         return
-    print_table(_summary(mission, talk), spec.name)
+    print_table(mission_rows(mission, details=talk is Talk.VERBOSE), spec.name)
     typer.echo(f"written to {folder}: {', '.join(written)}")
 
 
@@ -302,81 +302,3 @@ def _default_name(box: Box | None, area: Path | None) -> str:
 
 def _formats(export: str | None) -> list[str] | None:
     return None if export is None else [part.strip() for part in export.split(",") if part.strip()]
-
-
-def _result(mission: PlannedMission, folder: Path) -> dict[str, object]:
-    spec, found = mission.specification, mission.candidate
-    return {
-        "plans": [str(folder / f"{spec.name}.plan")],
-        "sidecar": str(folder / f"{spec.name}.npz"),
-        "stops": int(found.stops.size),
-        "cells_measured": int(found.stops.size),
-        "cells_flown_over": mission.cells_flown_over,
-        "path_length_m": mission.path_length_m,
-        "flown_length_m": mission.flown_length_m,
-        "path_length_cells": found.length_cells,
-        "coverage_fraction": mission.coverage_fraction,
-        "flight_time_s": mission.flight_time_s,
-        "endurance_s": mission.vehicle.endurance_s,
-        "flyable": mission.flyable,
-        "sorties": 1,
-        "expected_relative_error": mission.expected_relative_error,
-        "expected_relative_error_cells": mission.expected_relative_error_cells,
-        "planner": spec.search.planner,
-        "probability": found.probability,
-        "theta": found.theta,
-        "cost": found.cost,
-        "incoherence": found.incoherence,
-        "seed": spec.search.seed,
-        "warnings": list(mission.warnings),
-    }
-
-
-def _summary(mission: PlannedMission, talk: Talk) -> list[tuple[str, str]]:
-    spec, found, vehicle = mission.specification, mission.candidate, mission.vehicle
-    box = mission.place.grid.box
-    rows, columns = mission.place.grid.shape
-    model = mission.prior.model
-    table = [
-        (
-            "box",
-            f"{box.east_m / 1000:.4g} km east-west, {box.north_m / 1000:.4g} km north-south, {rows} x {columns} cells",
-        ),
-        ("stops", f"{found.stops.size} cells measured, {mission.cells_flown_over} flown over"),
-        (
-            "distance",
-            f"{mission.path_length_m / 1000:.2f} km over the stops, {mission.coverage_fraction:.1%} of full coverage "
-            f"({mission.place.full_coverage_m / 1000:.0f} km); "
-            f"{mission.flown_length_m / 1000:.2f} km with the way home",
-        ),
-        (
-            "time in the air",
-            f"{mission.flight_time_s / 60:.1f} min; {vehicle.name}: {vehicle.endurance_s / 60:.0f} min endurance, "
-            f"{mission.usable_s / 60:.0f} min less reserve",
-        ),
-        ("flyable", "yes, by endurance" if mission.flyable else "no: a planning study (see the warnings)"),
-        (
-            "expected error",
-            f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
-            f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells",
-        ),
-        (
-            "prior",
-            f"{model.provenance.get('source', 'model')}, windows of {model.window_m[0] / 1000:.4g} x "
-            f"{model.window_m[1] / 1000:.4g} km, {model.atoms} atoms",
-        ),
-    ]
-    if talk is Talk.VERBOSE:
-        weights = mission.weights
-        table += [
-            (
-                "sample",
-                f"r = {found.sample}, p = {found.probability:.4g}, theta = {found.theta}",
-            ),
-            (
-                "cost",
-                f"{found.cost:.6g} = {weights.valid:g} x {found.error:.6g} + {weights.path:.4g} x "
-                f"{found.length_cells:.4g} + {weights.incoherence:.4g} x {found.incoherence:.4g}",
-            ),
-        ]
-    return table

@@ -30,13 +30,14 @@ def _what_would_fly(mission: PlannedMission) -> str:
         f"A planning study, not a flight: it takes {mission.flight_time_s / 60:.0f} min in the air, the "
         f"{mission.vehicle.name} has {mission.usable_s / 60:.0f} min less its reserve. "
     )
-    left_s = mission.usable_s - _seconds_at_any_size(mission)
+    fixed_s = _seconds_at_any_size(mission)
+    left_s = mission.usable_s - fixed_s
     if left_s <= 0:
         return start + (
             "Climbing, dwelling, landing and the way from and to home alone take longer: shorten --hold, take off "
             "nearer, or take a vehicle of longer endurance (--vehicle FILE.toml)."
         )
-    shrink = left_s / (mission.flight_time_s - _seconds_at_any_size(mission))
+    shrink = left_s / (mission.flight_time_s - fixed_s)
     box = mission.place.grid.box
     return start + (
         f"The same route over a box of {_down(shrink * box.east_m)} x {_down(shrink * box.north_m)} km would fit, or "
@@ -48,11 +49,8 @@ def _what_would_fly(mission: PlannedMission) -> str:
 def _seconds_at_any_size(mission: PlannedMission) -> float:
     """Return the part of the flight that a smaller box would not shorten."""
     flight, plan = mission.specification.flight, mission.plan
-    transit_m = 0.0
-    if flight.home is not None:
-        ends = [plan.stops[0], plan.stops[-1]]
-        lon, lat = [stop.lon_deg for stop in ends], [stop.lat_deg for stop in ends]
-        transit_m = float(distance_m(plan.home.lon_deg, plan.home.lat_deg, lon, lat).sum())
+    # A home of its own stays where it is; one at the first stop comes nearer with the rest.
+    transit_m = 0.0 if flight.home is None else mission.flown_length_m - mission.path_length_m
     return flight_seconds(
         mission.vehicle,
         path_length_m=0.0,

@@ -35,6 +35,7 @@ _DAMAGED = (
     RuntimeError,
     SyntaxError,
     TypeError,
+    ValueError,
     struct.error,
     tokenize.TokenError,
     zipfile.BadZipFile,
@@ -210,7 +211,7 @@ def npz_to_arrays(content: bytes, source: str) -> dict[str, NDArray[Any]]:
         if isinstance(loaded, np.lib.npyio.NpzFile):
             with loaded as stored:
                 return {name: stored[name] for name in stored.files}
-    except (ValueError, *_DAMAGED) as error:
+    except _DAMAGED as error:
         raise ModelError(f"{source} cannot be read as .npz; is it damaged, cut short, or something else?") from error
     raise ModelError(f"{source} is not an .npz file but one array; make a model with 'sparsor learn'")
 
