@@ -59,5 +59,34 @@ class LinkFailureError(SparsorError):
     """The link or the vehicle failed on the way: silent, lost, refused, or not holding what was sent."""
 
 
+class LeftBehindError(LinkFailureError):
+    """It failed after something was sent to a vehicle.
+
+    Parameters
+    ----------
+    message : str
+    vehicle_state : str
+        What the vehicle holds or does now.
+    """
+
+    def __init__(self, message: str, vehicle_state: str) -> None:
+        super().__init__(message)
+        self.vehicle_state = vehicle_state
+
+
+class StoppedError(LeftBehindError):
+    """Ctrl-C ended it after something was sent to a vehicle."""
+
+    exit_code = 130
+
+
+class LogError(InputError):
+    """A flight log that cannot be read, or that lacks what is asked of it."""
+
+
+class CalibrationError(InputError):
+    """A calibration, unit or gas that is unknown, or that the log does not hold what is needed for."""
+
+
 class OutputError(SparsorError):
     """The result could not be written: the folder is read-only, full or gone."""

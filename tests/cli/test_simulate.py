@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
@@ -19,6 +20,7 @@ app = typer.Typer()
 app.command()(simulate)
 PROGRAM = "import typer; from sparsor.cli.simulate import simulate; typer.run(simulate)"
 HOME = ("--home", "51.51", "25.28")
+DOHA = Path(__file__).parents[2] / "missions" / "doha"
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
@@ -44,6 +46,24 @@ def test_it_is_a_vehicle_until_it_is_interrupted(autopilot):
             running.kill()
 
 
+def test_a_mission_folder_is_all_that_it_takes(tmp_path):
+    truth = tmp_path / "truth.nc"
+    options = ["--mission", str(DOHA), "--listen", "tcp:0", "--send-to", "udp:127.0.0.1:9", "--truth", str(truth)]
+    options += ["--wind", "5", "90", "--gusts", "1", "--gps-outage", "60:90", "--gps-outage", "200:210"]
+    with subprocess.Popen([sys.executable, "-c", PROGRAM, *options], stdout=subprocess.PIPE, text=True) as running:
+        try:
+            lines = [running.stdout.readline() for _ in range(4)]
+            assert "ArduCopter" in lines[0]
+            assert "51.5052 25.278" in lines[0]
+            assert "sends to 127.0.0.1:9; connect there to udpin://0.0.0.0:9" in lines[2]
+            assert str(truth) in lines[3]
+            assert truth.stat().st_size > 1000
+            running.send_signal(signal.SIGINT)
+            assert running.wait(timeout=20) == 0
+        finally:
+            running.kill()
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
@@ -56,13 +76,35 @@ def test_it_is_a_vehicle_until_it_is_interrupted(autopilot):
         (("--speedup", "0"), "a speed-up of 0"),
         (("--seed", "-1"), "seed -1"),
         (("--system", "0"), "system id 0"),
-        (("--home", "-70", "40"), "DOMAIN|domain|outside"),
+        (("--home", "-70", "40"), "built-in field covers the Gulf region; give a field of your own"),
+        (("--mission", "nowhere"), "'nowhere' is not a mission folder"),
+        (("--send-to", "14540"), "--send-to 14540: give udp:HOST:PORT"),
+        (("--send-to", "udp:127.0.0.1:0"), "--send-to udp:127.0.0.1:0: give"),
+        (("--wind", "-3", "90"), "a wind of -3 m/s"),
+        (("--gusts", "99"), "gusts of 99 m/s"),
+        (("--lose", "1"), "a share of 1 of the messages lost"),
+        (("--repeat", "2"), "a share of 2 of the messages repeated"),
+        (("--delay", "-1"), "a delay of -1 s"),
+        (("--silent-sensor", "60"), "--silent-sensor: '60' is not a window"),
+        (("--gps-outage", "90:60"), "--gps-outage: a window of 90:60 s"),
+        (("--link-loss", "a:b"), "--link-loss: 'a:b' is not a window"),
+        (("--low-battery", "-5"), "a low battery at -5 s"),
+        (("--field", "nowhere.tif"), "cannot read 'nowhere.tif'"),
+        (("--variable", "NO2"), "--variable only make sense with --field"),
+        (("--field-over", "52", "25", "51", "24"), "swapped"),
+        (("--no-sensor", "--truth", "t.nc", "--listen", "udp:0"), "without a sensor there is no field to write"),
     ],
 )
 def test_what_is_wrong_is_said(options, sentence):
     ran = CliRunner().invoke(app, [*HOME, *options])
     assert ran.exit_code == 2, ran.output
     assert re.search(sentence, ran.output.replace("\n", " "))
+
+
+def test_home_or_a_mission_is_needed():
+    ran = CliRunner().invoke(app, [])
+    assert ran.exit_code == 2
+    assert "Give --home LON LAT, or --mission DIR" in ran.output
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sparsor import __version__
+from sparsor.cli.download import download
+from sparsor.cli.fly import fly
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
 from sparsor.cli.plan import plan
 from sparsor.cli.record import record
+from sparsor.cli.send import send
 from sparsor.cli.simulate import simulate
 from sparsor.cli.upload import upload
 
@@ -34,7 +37,10 @@ app.command("plan")(plan)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
 app.command("upload")(upload)
+app.command("fly")(fly)
 app.command("record")(record)
+app.command("download")(download)
+app.command("send")(send)
 app.command("simulate")(simulate)
 
 

@@ -3,128 +3,242 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sparsor.cli.console import Quiet, Verbose, reporting
+from sparsor.cli.console import Quiet, Verbose, reporting, warn
 from sparsor.errors import InputError
 
 if TYPE_CHECKING:
-    from sparsor.link.practice import PracticeServer, PracticeSettings
+    from collections.abc import Iterator
 
-LISTENING = "Where it listens"
-VEHICLE = "What it is"
-SENSOR = "The sensor on it"
+    from sparsor.link.practice import PracticeServer, Window
+
+VEHICLE, LISTENING = "What it is", "Where it listens, and how fast time runs"
+SENSOR, FIELD, WIND = "The sensor on it", "The field that the sensor flies through", "The wind"
+TROUBLES = "What goes wrong (windows FROM:TO in simulated seconds since take-off)"
 DEFAULT_LISTEN = ("udp:14550", "tcp:5760")
+Box = tuple[float, float, float, float]
+SocketAddress = tuple[str, int]
 _ADDRESS = re.compile(r"(?P<kind>udp|udpin|tcp|tcpin)(?:://|:)(?:(?P<host>[^:/]*):)?(?P<port>\d{1,5})")
+_TARGET = re.compile(r"(?:udp|udpout)(?:://|:)(?P<host>[^:/]+):(?P<port>\d{1,5})")
+MOST_PORT = 65_535
+
+
+def _option(panel: str, help_text: str, *names: str, metavar: str | None = None) -> Any:  # noqa: ANN401
+    return typer.Option(*names, help=help_text, rich_help_panel=panel, metavar=metavar)
 
 
 @reporting
 def simulate(
+    mission: Annotated[
+        Path | None,
+        _option(VEHICLE, "Rehearse this mission: its home, autopilot, vehicle and box.", "--mission", metavar="DIR"),
+    ] = None,
     home: Annotated[
-        tuple[float, float],
-        typer.Option("--home", help="Where it stands.", metavar="LON LAT", rich_help_panel=VEHICLE),
-    ],
+        tuple[float, float] | None,
+        _option(VEHICLE, "Where it stands (default: the mission's home).", "--home", metavar="LON LAT"),
+    ] = None,
     home_altitude: Annotated[
-        float,
-        typer.Option(
-            "--home-altitude", help="Height of home above mean sea level, m.", metavar="M", rich_help_panel=VEHICLE
-        ),
-    ] = 0.0,
+        float | None,
+        _option(VEHICLE, "Height of home above mean sea level, m.", "--home-altitude", metavar="M"),
+    ] = None,
     autopilot: Annotated[
-        str, typer.Option("--autopilot", help="ardupilot or px4.", metavar="NAME", rich_help_panel=VEHICLE)
-    ] = "ardupilot",
+        str | None,
+        _option(VEHICLE, "ardupilot or px4 (default: the mission's, else ardupilot).", "--autopilot", metavar="NAME"),
+    ] = None,
     vehicle: Annotated[
-        str, typer.Option("--vehicle", help="quad, or a profile.", metavar="NAME|FILE.toml", rich_help_panel=VEHICLE)
-    ] = "quad",
-    system: Annotated[
-        int, typer.Option("--system", help="MAVLink system id.", metavar="ID", rich_help_panel=VEHICLE)
-    ] = 1,
-    listen: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--listen",
-            help="udp:PORT, tcp:PORT or udp:HOST:PORT; one of each (default: udp:14550 and tcp:5760).",
-            metavar="ADDRESS",
-            rich_help_panel=LISTENING,
+        str | None,
+        _option(
+            VEHICLE, "quad, or a profile (default: the mission's, else quad).", "--vehicle", metavar="NAME|FILE.toml"
         ),
     ] = None,
-    speedup: Annotated[
-        float,
-        typer.Option("--speedup", help="Simulated seconds a second.", metavar="N", rich_help_panel=LISTENING),
-    ] = 1.0,
-    sensor: Annotated[
-        bool,
-        typer.Option("--sensor/--no-sensor", help="Whether a sensor flies on it.", rich_help_panel=SENSOR),
-    ] = True,
+    system: Annotated[int, _option(VEHICLE, "MAVLink system id.", "--system", metavar="ID")] = 1,
+    logs: Annotated[
+        Path | None,
+        _option(
+            VEHICLE,
+            "Where the vehicle's own logs go (.BIN or .ulg, one a flight); without it they go with the program.",
+            "--logs",
+            metavar="DIR",
+        ),
+    ] = None,
+    listen: Annotated[
+        list[str] | None,
+        _option(
+            LISTENING,
+            "udp:PORT, tcp:PORT or udp:HOST:PORT; one of each (default: udp:14550 and tcp:5760, with --send-to the "
+            "latter).",
+            "--listen",
+            metavar="ADDRESS",
+        ),
+    ] = None,
+    send_to: Annotated[
+        list[str] | None,
+        _option(
+            LISTENING,
+            "Send from the start to who waits at udp:HOST:PORT, e.g. udp:127.0.0.1:14540 for udpin://0.0.0.0:14540; "
+            "may be repeated.",
+            "--send-to",
+            metavar="ADDRESS",
+        ),
+    ] = None,
+    speedup: Annotated[float, _option(LISTENING, "Simulated seconds a second.", "--speedup", metavar="N")] = 1.0,
+    seed: Annotated[int, _option(LISTENING, "Of noise, drop-outs, gusts and bad links.", "--seed", metavar="N")] = 0,
+    sensor: Annotated[bool, _option(SENSOR, "Whether a sensor flies on it.", "--sensor/--no-sensor")] = True,
     sensor_range: Annotated[
         tuple[float, float],
-        typer.Option(
-            "--sensor-range",
-            help="Reading at the field's lowest and highest value, ppb.",
-            metavar="LO HI",
-            rich_help_panel=SENSOR,
-        ),
+        _option(SENSOR, "Reading at the field's lowest and highest value, ppb.", "--sensor-range", metavar="LO HI"),
     ] = (10.0, 70.0),
-    t90: Annotated[
-        float, typer.Option("--t90", help="Time to 90 % of a step, s.", metavar="S", rich_help_panel=SENSOR)
-    ] = 30.0,
-    noise: Annotated[
-        float, typer.Option("--noise", help="Of each sample, ppb.", metavar="PPB", rich_help_panel=SENSOR)
-    ] = 1.0,
-    drift: Annotated[
-        float, typer.Option("--drift", help="After an hour, ppb.", metavar="PPB", rich_help_panel=SENSOR)
+    t90: Annotated[float, _option(SENSOR, "Time to 90 % of a step, s.", "--t90", metavar="S")] = 30.0,
+    noise: Annotated[float, _option(SENSOR, "Of each sample, ppb.", "--noise", metavar="PPB")] = 1.0,
+    drift: Annotated[float, _option(SENSOR, "After an hour, ppb.", "--drift", metavar="PPB")] = 0.0,
+    drop_outs: Annotated[float, _option(SENSOR, "Share of samples lost, 0..1.", "--drop-outs", metavar="SHARE")] = 0.0,
+    field: Annotated[
+        Path | None,
+        _option(
+            FIELD,
+            "GeoTIFF, NetCDF or a heatmap picture (default: the built-in synthetic field).",
+            "--field",
+            metavar="FILE",
+        ),
+    ] = None,
+    variable: Annotated[
+        str | None, _option(FIELD, "NetCDF variable, or GeoTIFF band.", "--variable", metavar="V")
+    ] = None,
+    field_time: Annotated[
+        str | None,
+        _option(FIELD, "NetCDF time step: its index or the beginning of its date.", "--field-time", metavar="T"),
+    ] = None,
+    field_bbox: Annotated[
+        Box | None, _option(FIELD, "Where a picture lies.", "--field-bbox", metavar="W S E N")
+    ] = None,
+    field_colormap: Annotated[
+        str | None,
+        _option(FIELD, "Colour map a picture was drawn with, e.g. viridis.", "--field-colormap", metavar="NAME"),
+    ] = None,
+    field_range: Annotated[
+        tuple[float, float] | None,
+        _option(FIELD, "Values of a picture's first and last colour.", "--field-range", metavar="LO HI"),
+    ] = None,
+    field_over: Annotated[
+        Box | None,
+        _option(
+            FIELD,
+            "Lay the field over this box, as a pattern (default: over the mission's box, else where it lies).",
+            "--field-over",
+            metavar="W S E N",
+        ),
+    ] = None,
+    truth: Annotated[
+        Path | None,
+        _option(FIELD, "Write the field it flies through, in ppb, to this NetCDF file.", "--truth", metavar="FILE.nc"),
+    ] = None,
+    wind: Annotated[
+        tuple[float, float],
+        _option(WIND, "Speed, m/s, and where it comes from, degrees (90: east).", "--wind", metavar="SPEED FROM_DEG"),
+    ] = (0.0, 0.0),
+    gusts: Annotated[
+        float, _option(WIND, "Standard deviation of gusts on top of it, m/s.", "--gusts", metavar="M_S")
     ] = 0.0,
-    drop_outs: Annotated[
-        float,
-        typer.Option("--drop-outs", help="Share of samples lost, 0..1.", metavar="SHARE", rich_help_panel=SENSOR),
+    lose: Annotated[
+        float, _option(TROUBLES, "Share of the messages lost, each way, all the time.", "--lose", metavar="SHARE")
     ] = 0.0,
-    seed: Annotated[
-        int, typer.Option("--seed", help="Of noise and drop-outs.", metavar="N", rich_help_panel=SENSOR)
-    ] = 0,
+    repeat: Annotated[
+        float, _option(TROUBLES, "Share of the messages that come twice.", "--repeat", metavar="SHARE")
+    ] = 0.0,
+    delay: Annotated[
+        float, _option(TROUBLES, "How long messages take, each way, s by the wall clock.", "--delay", metavar="S")
+    ] = 0.0,
+    silent_sensor: Annotated[
+        list[str] | None, _option(TROUBLES, "The sensor sends nothing.", "--silent-sensor", metavar="FROM:TO")
+    ] = None,
+    gps_outage: Annotated[
+        list[str] | None, _option(TROUBLES, "The GPS has no fix.", "--gps-outage", metavar="FROM:TO")
+    ] = None,
+    link_loss: Annotated[
+        list[str] | None, _option(TROUBLES, "Nothing gets in or out.", "--link-loss", metavar="FROM:TO")
+    ] = None,
+    low_battery: Annotated[
+        float | None,
+        _option(TROUBLES, "When the battery falls to what makes it return.", "--low-battery", metavar="S"),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Stand in for a vehicle, so that a mission can be rehearsed; not flight dynamics. Ctrl-C ends it.
 
-    sparsor simulate --home 51.51 25.28 --speedup 10
+    sparsor simulate --mission missions/doha --speedup 10
     """
     del verbose
-    from sparsor.link.practice import PracticeAutopilot, PracticeServer, SensorSettings
+    from sparsor.journeys.practising import FieldRequest, PracticeRequest, prepare_practice, write_truth
+    from sparsor.link.practice import (
+        LinkTroubles,
+        PracticeAutopilot,
+        PracticeServer,
+        SensorSettings,
+        Troubles,
+        WindSettings,
+    )
 
-    addresses = _addresses(listen or list(DEFAULT_LISTEN))
-    settings = _settings(
-        home=(*home, home_altitude),
-        autopilot=autopilot,
-        vehicle=vehicle,
-        system=system,
-        seed=seed,
-        sensor=SensorSettings(
-            low_ppb=sensor_range[0],
-            high_ppb=sensor_range[1],
-            t90_s=t90,
-            noise_ppb=noise,
-            drift_ppb_h=drift,
-            drop_out_fraction=drop_outs,
+    addresses = _addresses(listen or list(DEFAULT_LISTEN[1:] if send_to else DEFAULT_LISTEN))
+    targets = [_target(text) for text in send_to or ()]
+    practice = prepare_practice(
+        PracticeRequest(
+            mission=mission,
+            home=home,
+            home_altitude_m=home_altitude,
+            autopilot=autopilot,
+            vehicle=vehicle,
+            through=FieldRequest(field, variable, field_time, field_bbox, field_colormap, field_range, over=field_over),
+            sensor=SensorSettings(
+                low_ppb=sensor_range[0],
+                high_ppb=sensor_range[1],
+                t90_s=t90,
+                noise_ppb=noise,
+                drift_ppb_h=drift,
+                drop_out_fraction=drop_outs,
+            )
+            if sensor
+            else None,
+            wind=WindSettings(*wind, gusts),
+            troubles=Troubles(
+                silent_sensor=_windows("--silent-sensor", silent_sensor),
+                gps_outage=_windows("--gps-outage", gps_outage),
+                link_loss=_windows("--link-loss", link_loss),
+                low_battery_s=low_battery,
+                link=LinkTroubles(lose, repeat, delay),
+            ),
+            seed=seed,
+            system=system,
+            logs=logs,
         )
-        if sensor
-        else None,
     )
+    warn(practice.notes)
+    if truth is not None:
+        write_truth(practice, truth)
     server = PracticeServer(
-        PracticeAutopilot(settings), udp=addresses.get("udp"), tcp=addresses.get("tcp"), speedup=speedup
+        PracticeAutopilot(practice.settings),
+        udp=addresses.get("udp"),
+        tcp=addresses.get("tcp"),
+        send_to=targets,
+        speedup=speedup,
     )
-    if not quiet:
-        _introduce(server, addresses)
-    _serve(server)
+    with _until_interrupted(server):
+        if not quiet:
+            _introduce(server, addresses, targets, truth)
+        server.run()
 
 
-def _addresses(texts: list[str]) -> dict[str, tuple[str, int]]:
+def _addresses(texts: list[str]) -> dict[str, SocketAddress]:
     """Return host and port for each of udp and tcp that is asked for."""
-    found: dict[str, tuple[str, int]] = {}
+    found: dict[str, SocketAddress] = {}
     for text in texts:
         match = _ADDRESS.fullmatch(text)
-        if not match or int(match["port"]) > 65_535:
+        if not match or int(match["port"]) > MOST_PORT:
             raise InputError(f"--listen {text}: give udp:PORT, tcp:PORT or udp:HOST:PORT, e.g. udp:14550")
         kind = match["kind"].removesuffix("in")
         if kind in found:
@@ -133,35 +247,26 @@ def _addresses(texts: list[str]) -> dict[str, tuple[str, int]]:
     return found
 
 
-def _settings(
-    *,
-    home: tuple[float, float, float],
-    autopilot: str,
-    vehicle: str,
-    system: int,
-    seed: int,
-    sensor: object,
-) -> PracticeSettings:
-    import time
-
-    from sparsor.link.practice import PracticeSettings, SensorSettings, built_in_truth, flavour_named
-    from sparsor.mission import Home
-    from sparsor.vehicle import load_vehicle
-
-    lon, lat, altitude = home
-    return PracticeSettings(
-        home=Home(lon, lat, altitude, altitude_known=altitude != 0),
-        flavour=flavour_named(autopilot),
-        vehicle=load_vehicle(vehicle),
-        sensor=sensor if isinstance(sensor, SensorSettings) else SensorSettings(),
-        truth=built_in_truth(lon, lat) if sensor else None,
-        seed=seed,
-        system=system,
-        boot_unix_s=time.time(),
-    )
+def _target(text: str) -> SocketAddress:
+    """Return host and port to send to."""
+    match = _TARGET.fullmatch(text)
+    if not match or not 0 < int(match["port"]) <= MOST_PORT:
+        raise InputError(f"--send-to {text}: give udp:HOST:PORT, e.g. udp:127.0.0.1:14540")
+    return match["host"], int(match["port"])
 
 
-def _introduce(server: PracticeServer, addresses: dict[str, tuple[str, int]]) -> None:
+def _windows(option: str, texts: list[str] | None) -> tuple[Window, ...]:
+    from sparsor.link.practice import Window
+
+    try:
+        return tuple(Window.parse(text) for text in texts or ())
+    except InputError as error:
+        raise InputError(f"{option}: {error}") from error
+
+
+def _introduce(
+    server: PracticeServer, addresses: dict[str, SocketAddress], targets: list[SocketAddress], truth: Path | None
+) -> None:
     settings = server.autopilot.settings
     place = f"{settings.home.lon_deg:g} {settings.home.lat_deg:g}"
     typer.echo(f"{settings.flavour.title} at {place}, for rehearsals; not flight dynamics")
@@ -169,19 +274,23 @@ def _introduce(server: PracticeServer, addresses: dict[str, tuple[str, int]]) ->
         typer.echo(f"connect to udpout://{addresses['udp'][0]}:{server.udp_port}")
     if server.tcp_port:
         typer.echo(f"connect to tcpout://{addresses['tcp'][0]}:{server.tcp_port}")
+    for host, port in targets:
+        typer.echo(f"sends to {host}:{port}; connect there to udpin://0.0.0.0:{port}")
+    if truth is not None:
+        typer.echo(f"the field it flies through is in {truth}")
 
 
-def _serve(server: PracticeServer) -> None:
+@contextmanager
+def _until_interrupted(server: PracticeServer) -> Iterator[None]:
+    """Let Ctrl-C and a request to terminate end the server, from before it says where it listens."""
     import signal
-    import sys
 
     def stop(*_: object) -> None:
         server.stop()
 
-    sys.stdout.flush()
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server.run()
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

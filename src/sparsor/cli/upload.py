@@ -2,40 +2,49 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sparsor.cli.console import (
-    Json,
-    Quiet,
-    Talk,
-    Verbose,
-    print_json,
-    print_table,
-    progress_bar,
-    reporting,
-    warn,
-)
+from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, print_table, reporting, warn
+from sparsor.cli.flightscreen import FlightScreen, fence_words
+from sparsor.errors import SparsorError
 
 if TYPE_CHECKING:
-    from sparsor.link.upload import UploadReport
+    from collections.abc import Iterator
+
+    from sparsor.link.missions.upload import UploadReport
 
 CONNECT_HELP = "Where the vehicle is: udpin://0.0.0.0:14550, tcpout://127.0.0.1:5760, serial:///dev/ttyUSB0:57600 ..."
+Sortie = Annotated[int | None, typer.Option("--sortie", metavar="N", help="Which plan of a folder with several.")]
+System = Annotated[
+    int | None, typer.Option("--system", metavar="ID", min=1, max=255, help="Which of several vehicles.")
+]
+EnableFence = Annotated[
+    bool, typer.Option("--enable-fence", help="Make the vehicle keep to the plan's fence, and to nothing else.")
+]
+Yes = Annotated[bool, typer.Option("--yes", help="Arm and start without a question.")]
+Timeout = Annotated[
+    float, typer.Option("--timeout", metavar="S", min=0.1, max=3600, help="How long to wait for the vehicle.")
+]
 
 
 @reporting
 def upload(
     plan: Annotated[Path, typer.Argument(metavar="DIR|FILE.plan", help="A mission folder or any .plan.")],
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
-    sortie: Annotated[int | None, typer.Option(metavar="N", help="Which plan of a folder with several.")] = None,
-    system: Annotated[int | None, typer.Option(metavar="ID", min=1, max=255, help="Which of several vehicles.")] = None,
+    sortie: Sortie = None,
+    system: System = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Do all but the sending.")] = False,
+    start: Annotated[
+        bool, typer.Option("--start", help="Arm and start after the upload, and after a question.")
+    ] = False,
+    enable_fence: EnableFence = False,
+    yes: Yes = False,
     force: Annotated[bool, typer.Option("--force", help="Send to an armed vehicle too.")] = False,
-    timeout: Annotated[
-        float, typer.Option("--timeout", metavar="S", min=0.1, max=3600, help="How long to wait for the vehicle.")
-    ] = 10.0,
+    timeout: Timeout = 10.0,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -47,7 +56,7 @@ def upload(
     from sparsor.journeys.uploading import upload_mission
 
     talk = Talk.of(quiet=quiet, verbose=verbose)
-    with progress_bar(talk) as progress:
+    with telling_the_state(as_json), FlightScreen(talk, yes=yes or not start) as screen:
         report = upload_mission(
             plan,
             connect,
@@ -55,9 +64,12 @@ def upload(
             system_id=system,
             dry_run=dry_run,
             force=force,
+            enable_fence=enable_fence,
+            start=screen.confirm if start else None,
             timeout_s=timeout,
-            progress=progress,
-            found=lambda vehicle: None if talk is Talk.QUIET else typer.echo(f"found {vehicle.words}", err=True),
+            progress=screen.progress,
+            found=screen.found,
+            told=screen.told,
         )
     warn(report.warnings)
     if as_json:
@@ -66,6 +78,18 @@ def upload(
         typer.echo(report.vehicle_state)
     else:
         print_table(_rows(report), title="Nothing was sent" if dry_run else "Uploaded")
+
+
+@contextmanager
+def telling_the_state(as_json: bool) -> Iterator[None]:
+    """Print one JSON object with the error and what the vehicle is left with, where a result would have been."""
+    try:
+        yield
+    except SparsorError as error:
+        if as_json:
+            state = getattr(error, "vehicle_state", "unchanged")
+            print_json({"error": str(error), "vehicle_state": state})
+        raise
 
 
 def _contents(report: UploadReport) -> dict[str, object]:
@@ -81,22 +105,19 @@ def _contents(report: UploadReport) -> dict[str, object]:
         "changed": list(report.changed),
         "vehicle_state": report.vehicle_state,
         "warnings": list(report.warnings),
+        **({} if report.started is None else {"started": report.started}),
     }
 
 
 def _rows(report: UploadReport) -> list[tuple[str, str]]:
     verified = {True: "read back and the same", None: "nothing was sent", False: "no"}[report.verified]
-    enforced = {
-        True: "enforced",
-        False: "NOT enforced: the autopilot ignores it until it is told otherwise",
-        None: "the autopilot does not say whether it is enforced",
-    }[report.fence_enforced]
     return [
         ("vehicle", f"{report.autopilot} {report.vehicle}, system {report.system_id}"),
         ("items", str(report.items)),
-        ("fence", f"{report.fence_points} points, {enforced}"),
+        ("fence", fence_words(report)),
         ("rally points", str(report.rally_points)),
         ("verified", verified),
         *(("changed", sentence) for sentence in report.changed),
         ("it holds", report.vehicle_state if report.verified else "what it held before"),
+        *([] if report.started is None else [("mission", "started" if report.started else "not started")]),
     ]

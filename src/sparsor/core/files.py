@@ -8,9 +8,9 @@ import os
 import signal
 import tempfile
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from sparsor.errors import OutputError
 
@@ -30,7 +30,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     folder : Path
         Made, with its parents, when it does not exist.
     contents : mapping of str to bytes
-        File name inside `folder` to its contents.
+        File name inside `folder`, perhaps with a folder before it or whole, to its contents.
 
     Raises
     ------
@@ -40,8 +40,9 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     made: list[Path] = []
     written: list[tuple[Path, Path]] = []
     try:
-        made = _missing_folders(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        for home in dict.fromkeys((folder, *((folder / name).parent for name in contents))):
+            made = [*_missing_folders(home), *made]
+            home.mkdir(parents=True, exist_ok=True)
         for name, content in contents.items():
             target = folder / name
             if target.is_dir():
@@ -72,6 +73,31 @@ def write_file(path: Path, content: bytes) -> None:
     write_files(path.parent, {path.name: content})
 
 
+@contextmanager
+def file_written_in_pieces(path: Path) -> Iterator[BinaryIO]:
+    """Yield a stream whose contents become the file when the block ends; they are dropped when it raises.
+
+    For what is too large to be held in memory. Until then it has a temporary name beside its target.
+
+    Parameters
+    ----------
+    path : Path
+        Its folder has to exist.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    try:
+        with _temporary_file(path) as (temporary, stream):
+            yield stream
+            _finish(temporary, stream)
+            temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
+
+
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file's contents, in hexadecimal."""
     with path.open("rb") as stream:
@@ -79,19 +105,31 @@ def sha256_of(path: Path) -> str:
 
 
 def _write_temporary(target: Path, content: bytes) -> Path:
+    with _temporary_file(target) as (temporary, stream):
+        stream.write(content)
+        _finish(temporary, stream)
+    return temporary
+
+
+@contextmanager
+def _temporary_file(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
+    """Yield a new file beside its target, which is removed again when the block raises."""
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        # mkstemp makes the file private; what we leave behind has the permissions a plain open() gives.
-        temporary.chmod(0o666 & ~_umask())
+            yield temporary, stream
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-    return temporary
+
+
+def _finish(temporary: Path, stream: BinaryIO) -> None:
+    stream.flush()
+    os.fsync(stream.fileno())
+    # mkstemp makes the file private; what we leave behind has the permissions a plain open() gives.
+    temporary.chmod(0o666 & ~_umask())
+    stream.close()
 
 
 @contextmanager
@@ -128,7 +166,5 @@ def _missing_folders(folder: Path) -> list[Path]:
 def _remove_empty(folders: list[Path]) -> None:
     """Remove the folders that were made for a write that then failed; deepest first."""
     for path in folders:
-        try:
+        with suppress(OSError):
             path.rmdir()
-        except OSError:
-            return

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sparsor.core.progress import silent
-from sparsor.errors import MissionError
-from sparsor.link.addresses import parse_address
+from sparsor.errors import LinkError, MissionError, StoppedError
 from sparsor.link.connection import Connection
-from sparsor.link.upload import UploadReport, upload_plan
+from sparsor.link.flights.flying import Flight
+from sparsor.link.flights.modes import flight_modes
+from sparsor.link.flights.samples import SampleCounter
+from sparsor.link.missions.upload import UploadReport, upload_plan
+from sparsor.link.ports.addresses import parse_address
 from sparsor.link.vehicles import find_vehicle
 from sparsor.mission import read_plan
 
@@ -18,6 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from sparsor.core.progress import Progress
+    from sparsor.link.flights.views import Event
     from sparsor.link.vehicles import FoundVehicle
 
 
@@ -29,11 +34,15 @@ def upload_mission(
     system_id: int | None = None,
     dry_run: bool = False,
     force: bool = False,
+    enable_fence: bool = False,
+    start: Callable[[], bool] | None = None,
     timeout_s: float = 10.0,
+    ready_timeout_s: float = 120.0,
     progress: Progress = silent,
     found: Callable[[FoundVehicle], None] = lambda _: None,
+    told: Callable[[Event], None] = lambda _: None,
 ) -> UploadReport:
-    """Send a plan to a vehicle and verify that it holds it.
+    """Send a plan to a vehicle and verify that it holds it; perhaps start it.
 
     Parameters
     ----------
@@ -45,26 +54,52 @@ def upload_mission(
         Which plan of a folder that holds several.
     system_id : int or None
         Which vehicle, where there are several.
-    dry_run, force : bool
+    dry_run, force, enable_fence : bool
         As `upload_plan`.
-    timeout_s : float
-        How long to wait for the vehicle.
+    start : callable or None
+        Asked after the upload whether to arm and start; None: no.
+    timeout_s, ready_timeout_s : float
+        How long to wait for the vehicle, and for its being ready to fly.
     progress : Progress
     found : callable
         Told which vehicle was found, before anything is sent.
+    told : callable
+        Gets what happens while the mission is started.
 
     Raises
     ------
     InputError
         When the plan, the address or the vehicle is not one that this can be done with; nothing was sent.
     LinkFailureError
-        When the vehicle is silent or the transfer fails.
+        When the vehicle is silent, the transfer fails or the mission does not start. StoppedError after a Ctrl-C.
     """
+    if start is not None and dry_run:
+        raise LinkError("a dry run sends nothing, so nothing can be started: leave out --start or --dry-run")
     plan = read_plan(choose_plan(path, sortie))
     with Connection(parse_address(url), timeout_s=timeout_s) as connection:
+        samples = SampleCounter()
+        connection.listen(samples)
         vehicle = find_vehicle(connection, system_id, timeout_s)
+        samples.system_id = vehicle.system_id
         found(vehicle)
-        return upload_plan(plan, connection, vehicle, dry_run=dry_run, force=force, progress=progress)
+        if start is not None:
+            flight_modes(vehicle)  # refuses what cannot be started before anything is sent
+        report = upload_plan(
+            plan, connection, vehicle, dry_run=dry_run, force=force, enable_fence=enable_fence, progress=progress
+        )
+        if start is None:
+            return report
+        try:
+            if not start():
+                return replace(report, started=False)
+            with Flight(connection, vehicle, plan, samples, told=told) as flight:
+                flight.start(ready_timeout_s)
+        except KeyboardInterrupt:
+            raise StoppedError(
+                "interrupted. The vehicle: it holds the new plan, and flies it if it has taken off",
+                "new plan, perhaps under way",
+            ) from None
+        return replace(report, started=True)
 
 
 def choose_plan(path: Path, sortie: int | None = None) -> Path:

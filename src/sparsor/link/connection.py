@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, Self
 
 from sparsor.core.mavlink_frames import Frame, FrameReader
 from sparsor.errors import LinkFailureError, SparsorError
-from sparsor.link.addresses import Address, parse_address
-from sparsor.link.endpoints import open_endpoint
 from sparsor.link.inbox import Inbox, Message, Received
+from sparsor.link.ports.addresses import Address, parse_address
+from sparsor.link.ports.endpoints import open_endpoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -117,7 +117,7 @@ class Connection:
         """Return a box that keeps the messages of these kinds from now on, until it is closed."""
         return Inbox(self, frozenset(kinds), system_id)
 
-    def send(self, message: Message, *, as_system: int = OUR_SYSTEM) -> None:
+    def send(self, message: Message, *, as_system: int = OUR_SYSTEM, as_component: int = OUR_COMPONENT) -> None:
         """Send a pymavlink message as this ground station, or in the name of another one on our side.
 
         Raises
@@ -126,7 +126,7 @@ class Connection:
             When the link is gone.
         """
         with self._sending:
-            self._codec.srcSystem = as_system
+            self._codec.srcSystem, self._codec.srcComponent = as_system, as_component
             raw = bytes(message.pack(self._codec))
             self._codec.seq = (self._codec.seq + 1) % 256  # `pack` leaves the counting to its caller
             self._put(raw, [Frame(raw)])

@@ -1,10 +1,14 @@
-"""Reading the few parameters of a vehicle that the upload asks about (PARAM_REQUEST_READ)."""
+"""Reading and setting parameters of a vehicle (https://mavlink.io/en/services/parameter.html)."""
 
 from __future__ import annotations
 
+import math
 import struct
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
+
+from sparsor.errors import LinkFailureError
 
 if TYPE_CHECKING:
     from sparsor.link.connection import Connection
@@ -12,12 +16,30 @@ if TYPE_CHECKING:
     from sparsor.link.vehicles import FoundVehicle
 
 ANSWER_S: Final = 0.7
-TRIES: Final = 3
-INT32: Final = 6  # MAV_PARAM_TYPE_INT32
+READ_TRIES: Final = 6
+SET_TRIES: Final = 15
+REAL32: Final = 9  # MAV_PARAM_TYPE_REAL32
 
 
-def read_parameter(connection: Connection, vehicle: FoundVehicle, name: str) -> float | None:
-    """Return a parameter's value; None when the vehicle does not answer (it may not have it).
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter as the vehicle tells it.
+
+    Parameters
+    ----------
+    name : str
+    value : float
+    kind : int
+        MAV_PARAM_TYPE.
+    """
+
+    name: str
+    value: float
+    kind: int
+
+
+def read_parameter(connection: Connection, vehicle: FoundVehicle, name: str) -> Parameter | None:
+    """Return a parameter; None when the vehicle does not answer (it may not have it).
 
     Raises
     ------
@@ -28,45 +50,54 @@ def read_parameter(connection: Connection, vehicle: FoundVehicle, name: str) -> 
 
     asked = mavlink.MAVLink_param_request_read_message(vehicle.system_id, vehicle.component_id, name.encode(), -1)
     with connection.inbox("PARAM_VALUE", system_id=vehicle.system_id) as inbox:
-        for _ in range(TRIES):
+        for _ in range(READ_TRIES):
             connection.send(asked)
             for answer in inbox.until(time.monotonic() + ANSWER_S):
                 if answer.message.param_id == name:
-                    return _value(answer.message, vehicle)
+                    return _told(answer.message, vehicle)
     return None
 
 
-def fence_enforced(connection: Connection, vehicle: FoundVehicle) -> bool | None:
-    """Return whether the vehicle will keep to an uploaded fence; None when it does not say.
+def set_parameter(connection: Connection, vehicle: FoundVehicle, wanted: Parameter) -> None:
+    """Set a parameter: sent until the vehicle tells that it has this value.
 
-    ArduPilot: FENCE_ENABLE is set and FENCE_TYPE has the bit of polygons (4). PX4: GF_ACTION is not 0 (none).
+    Raises
+    ------
+    LinkFailureError
+        When it does not take it, or the link is gone.
     """
-    if vehicle.autopilot is not None and vehicle.autopilot.name == "px4":
-        action = read_parameter(connection, vehicle, "GF_ACTION")
-        return None if action is None else action != 0
-    enabled = read_parameter(connection, vehicle, "FENCE_ENABLE")
-    if not enabled:
-        return None if enabled is None else False
-    kinds = read_parameter(connection, vehicle, "FENCE_TYPE")
-    return None if kinds is None else bool(int(kinds) & 4)
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    sent = mavlink.MAVLink_param_set_message(
+        vehicle.system_id, vehicle.component_id, wanted.name.encode(), _encoded(wanted, vehicle), wanted.kind
+    )
+    told: Parameter | None = None
+    with connection.inbox("PARAM_VALUE", system_id=vehicle.system_id) as inbox:
+        for _ in range(SET_TRIES):
+            connection.send(sent)
+            for answer in inbox.until(time.monotonic() + ANSWER_S):
+                if answer.message.param_id != wanted.name:
+                    continue
+                told = _told(answer.message, vehicle)
+                if math.isclose(told.value, wanted.value, rel_tol=1e-6):
+                    return
+    answered = "does not answer" if told is None else f"keeps {told.value:g}"
+    raise LinkFailureError(f"setting {wanted.name} to {wanted.value:g} failed: the vehicle {answered}")
 
 
-def fence_ceiling_m(connection: Connection, vehicle: FoundVehicle) -> float | None:
-    """Return the height above home at which an enabled altitude fence of ArduPilot begins; None without one.
-
-    FENCE_ENABLE is set, FENCE_TYPE has the bit 1; FENCE_ALT_MAX, metres.
-    """
-    if vehicle.autopilot is None or vehicle.autopilot.name != "ardupilot":
-        return None
-    if not read_parameter(connection, vehicle, "FENCE_ENABLE"):
-        return None
-    kinds = read_parameter(connection, vehicle, "FENCE_TYPE")
-    return read_parameter(connection, vehicle, "FENCE_ALT_MAX") if kinds and int(kinds) & 1 else None
+def _bytewise(kind: int, vehicle: FoundVehicle) -> bool:
+    """Whether the bits of a whole number take the float's place (PX4), not its value (ArduPilot)."""
+    return vehicle.autopilot is not None and vehicle.autopilot.name == "px4" and kind != REAL32
 
 
-def _value(message: Message, vehicle: FoundVehicle) -> float:
-    value = float(message.param_value)
-    # PX4 sends the bits of a whole number in the float's place, ArduPilot its value.
-    if vehicle.autopilot is not None and vehicle.autopilot.name == "px4" and message.param_type == INT32:
-        return float(struct.unpack("<i", struct.pack("<f", value))[0])
-    return value
+def _told(message: Message, vehicle: FoundVehicle) -> Parameter:
+    value, kind = float(message.param_value), int(message.param_type)
+    if _bytewise(kind, vehicle):
+        value = float(struct.unpack("<i", struct.pack("<f", value))[0])
+    return Parameter(str(message.param_id), value, kind)
+
+
+def _encoded(parameter: Parameter, vehicle: FoundVehicle) -> float:
+    if _bytewise(parameter.kind, vehicle):
+        return float(struct.unpack("<f", struct.pack("<i", round(parameter.value)))[0])
+    return parameter.value

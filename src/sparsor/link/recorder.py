@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 from sparsor.core.progress import silent
 from sparsor.errors import LinkFailureError
-from sparsor.link.addresses import parse_address
 from sparsor.link.connection import Connection
+from sparsor.link.flights.orders import command_long
+from sparsor.link.ports.addresses import parse_address
 from sparsor.link.tlog import TlogWriter
 from sparsor.link.vehicles import vehicle_of
 
@@ -28,6 +29,7 @@ STREAMS: Final = {
     "SYSTEM_TIME": 1.0,
     "ATTITUDE": 4.0,
     "MISSION_CURRENT": 1.0,
+    "EXTENDED_SYS_STATE": 1.0,
     "SYS_STATUS": 1.0,
 }
 
@@ -120,12 +122,7 @@ def request_streams(connection: Connection, vehicle: FoundVehicle) -> None:
 
     for name, rate_hz in STREAMS.items():
         number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-        connection.send(
-            mavlink.MAVLink_command_long_message(
-                vehicle.system_id, vehicle.component_id, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0,
-                number, 1e6 / rate_hz, 0, 0, 0, 0, 0,
-            )
-        )  # fmt: skip
+        connection.send(command_long(vehicle, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz))
 
 
 def _watch(

@@ -10,14 +10,14 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
-from pymavlink import mavutil
+from pymavlink import mavutil, mavwp
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mission_strategies import AUTOPILOT_NAMES, example_plan
 from practice_rig import ARM, START, mission_messages
 from sparsor.errors import InputError, OutputError
 from sparsor.link.practice import PracticeAutopilot, PracticeServer, PracticeSettings, flavour_named
-from sparsor.mission import plan_bytes
+from sparsor.mission import export_bytes, plan_bytes
 
 HOST = "127.0.0.1"
 either = pytest.mark.parametrize("autopilot", AUTOPILOT_NAMES)
@@ -123,6 +123,41 @@ def test_mavutil_uploads_and_flies_to_the_end(autopilot, link):
             wait_for(client, "HEARTBEAT", lambda beat: not beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
             assert server.autopilot.flight.landed
             assert server.autopilot.flight.navigator.finished
+
+
+@either
+def test_mavwp_loads_a_waypoints_file_and_mavutil_sends_it_as_floats(autopilot, tmp_path):
+    plan = example_plan(autopilot, stops=3)
+    path = tmp_path / "plan.waypoints"
+    path.write_bytes(export_bytes(plan, "plan", "waypoints"))
+    loader = mavwp.MAVWPLoader(target_system=1, target_component=1)
+    total = loader.load(str(path))
+    with served(autopilot, plan=plan) as server, mavutil_client(f"udpout:{HOST}:{server.udp_port}") as client:
+        client.waypoint_count_send(total)
+        while True:
+            message = wait_for(client, ["MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"])
+            if message.get_type() == "MISSION_ACK":
+                break
+            client.mav.send(loader.wp(message.seq))
+        assert message.type == mavlink.MAV_MISSION_ACCEPTED
+        stored = server.autopilot.store.items[0]
+        assert [item.command for item in stored] == [loader.wp(seq).command for seq in range(total)]
+        # The floats of MISSION_ITEM are good to about two metres.
+        assert [item.lat_deg for item in stored[1:]] == pytest.approx(
+            [loader.wp(seq).x for seq in range(1, total)], abs=2e-5
+        )
+
+
+@either
+def test_mavutil_changes_the_mode_by_name_and_arms(autopilot):
+    mode = "GUIDED" if autopilot == "ardupilot" else "POSCTL"
+    with served(autopilot, ready_s=0.0) as server, mavutil_client(f"tcp:{HOST}:{server.tcp_port}") as client:
+        client.set_mode(mode)
+        wait_for(client, "HEARTBEAT", lambda beat: mavutil.mode_string_v10(beat) == mode)
+        client.arducopter_arm()
+        wait_for(client, "HEARTBEAT", lambda beat: beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        client.arducopter_disarm()
+        wait_for(client, "HEARTBEAT", lambda beat: not beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
 
 @either

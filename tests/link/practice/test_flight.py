@@ -18,6 +18,8 @@ from sparsor.mission import Home, build_mission, flight_time_s
 
 def flown(plan, autopilot, **options):
     rig = Rig.of(autopilot, plan=plan, **options)
+    if autopilot == "px4":  # else a take-off to 3 m at least
+        rig.vehicle.parameters.set("NAV_ACC_RAD", 0.0)
     assert rig.upload(mission_messages(plan, autopilot)) == 0
     rig.run(10)
     rig.take_off()
@@ -138,9 +140,6 @@ def test_px4_refuses_what_navigator_refuses():
     assert rig.upload([away]) == 0
     assert rig.command(START) != 0
     assert any("too far away" in text for text in rig.said())
-    assert rig.upload([item_message(0, 16, 3, (0, 0, 0, 0, plan.home.lat_deg, plan.home.lon_deg, 50))]) == 0
-    assert rig.command(START) != 0
-    assert any("takeoff is missing" in text for text in rig.said())
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOT_NAMES)
@@ -164,7 +163,7 @@ def test_a_flight_beyond_the_battery_returns():
     rig.run(10)
     rig.take_off()
     assert rig.run(400, until=lambda: rig.flight.mode is Mode.RETURN)
-    assert any("Battery low" in text for text in rig.said())
+    assert any("Low battery" in text for text in rig.said())
 
 
 def test_ardupilot_sends_nothing_but_heartbeats_until_asked_and_px4_does():

@@ -5,12 +5,16 @@ See docs/practice-autopilot.md for what it does as ArduPilot and PX4 do, and wha
 
 from sparsor.link.practice.autopilot import PracticeAutopilot, PracticeSettings, Sample
 from sparsor.link.practice.flavour import FLAVOURS, Flavour, flavour_named
-from sparsor.link.practice.sensor import PracticeSensor, RasterTruth, SensorSettings, Truth, built_in_truth
+from sparsor.link.practice.sensor import PracticeSensor, SensorSettings, Truth
 from sparsor.link.practice.server import PracticeServer
+from sparsor.link.practice.troubles import LinkTroubles, Troubles, Window
+from sparsor.link.practice.truth import RasterTruth, built_in_over, built_in_truth, field_truth, truth_netcdf
+from sparsor.link.practice.wind import Wind, WindSettings
 
 __all__ = [
     "FLAVOURS",
     "Flavour",
+    "LinkTroubles",
     "PracticeAutopilot",
     "PracticeSensor",
     "PracticeServer",
@@ -18,7 +22,14 @@ __all__ = [
     "RasterTruth",
     "Sample",
     "SensorSettings",
+    "Troubles",
     "Truth",
+    "Wind",
+    "WindSettings",
+    "Window",
+    "built_in_over",
     "built_in_truth",
+    "field_truth",
     "flavour_named",
+    "truth_netcdf",
 ]

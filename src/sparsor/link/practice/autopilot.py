@@ -10,8 +10,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sparsor.errors import InputError
 from sparsor.link.practice.commands import Commands
 from sparsor.link.practice.exchange import Message, Outgoing, Peer
+from sparsor.link.practice.failsafes import Failsafes
 from sparsor.link.practice.flavour import ARDUPILOT, Flavour
 from sparsor.link.practice.flight import Flight
+from sparsor.link.practice.logserver import REQUESTS, LogServer
 from sparsor.link.practice.messages import boot_ms, heartbeat, mission_current
 from sparsor.link.practice.parameters import Parameters
 from sparsor.link.practice.sensor import PracticeSensor, SensorSettings, Truth
@@ -20,9 +22,14 @@ from sparsor.link.practice.telemetry import Telemetry
 from sparsor.link.practice.transfer import MissionStore
 from sparsor.link.practice.transfer_ardupilot import ArduPilotTransfers
 from sparsor.link.practice.transfer_px4 import Px4Transfers
+from sparsor.link.practice.troubles import Troubles, during
+from sparsor.link.practice.vehiclelog import NamedValue, VehicleLog
+from sparsor.link.practice.wind import Wind, WindSettings
 from sparsor.vehicle import Vehicle, autopilot_named, load_vehicle
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from sparsor.link.practice.transfer import Transfers
     from sparsor.mission import Home
 
@@ -43,14 +50,18 @@ class PracticeSettings:
     sensor : SensorSettings
     truth : callable, optional
         The field's value s at a longitude and latitude; None flies no sensor.
+    wind : WindSettings
+    troubles : Troubles
     seed : int
-        Of the sensor.
+        Of the sensor, the gusts and the bad links.
     system : int
         MAVLink system id, 1..255.
     ready_s : float
         Simulated seconds from power-up to being ready to fly missions.
     boot_unix_s : float
         What the clock says at power-up, seconds since 1970.
+    logs : Path, optional
+        Folder for the vehicle's own logs; None keeps them as long as the program runs.
 
     Raises
     ------
@@ -63,10 +74,13 @@ class PracticeSettings:
     vehicle: Vehicle = field(default_factory=lambda: load_vehicle("quad"))
     sensor: SensorSettings = field(default_factory=SensorSettings)
     truth: Truth | None = None
+    wind: WindSettings = field(default_factory=WindSettings)
+    troubles: Troubles = field(default_factory=Troubles)
     seed: int = 0
     system: int = 1
     ready_s: float = 8.0
     boot_unix_s: float = 1_700_000_000.0
+    logs: Path | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.system <= 255:
@@ -108,7 +122,17 @@ class PracticeAutopilot:
             home=StoredItem(mavlink.MAV_CMD_NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, 0.0), lat, lon, home.alt_amsl_m),
         )
         self.parameters = Parameters(flavour, self.store, settings.system)
-        self.flight = Flight(flavour, settings.vehicle, self.store, self.parameters, home, settings.ready_s)
+        self.flight = Flight(
+            flavour,
+            settings.vehicle,
+            self.store,
+            self.parameters,
+            home,
+            settings.ready_s,
+            Wind(settings.wind, settings.seed),
+            settings.troubles,
+        )
+        self._failsafes = Failsafes(self.flight)
         self.samples: list[Sample] = []
         """What the sensor sent so far."""
         make = Px4Transfers if flavour.is_px4 else ArduPilotTransfers
@@ -116,6 +140,8 @@ class PracticeAutopilot:
         self._telemetry = Telemetry(self.flight, settings.boot_unix_s)
         self._commands = Commands(self.flight, self._telemetry)
         self._sensor = PracticeSensor(settings.truth, settings.sensor, settings.seed) if settings.truth else None
+        self._log = VehicleLog(self.flight, settings.boot_unix_s, settings.system, settings.logs)
+        self._log_server = LogServer(self._log, px4=flavour.is_px4)
         self._steps = 0
         self._beat_s = self._beat_wall_s = float("-inf")
         self._current = -1
@@ -125,6 +151,11 @@ class PracticeAutopilot:
         """Simulated seconds since power-up."""
         return self.flight.time_s
 
+    @property
+    def link_lost(self) -> bool:
+        """Whether a link loss is on: nothing gets in or out."""
+        return self.flight.link_lost
+
     def join(self, link: int) -> None:
         """Send telemetry to a link that opened."""
         self._telemetry.join(link)
@@ -132,6 +163,7 @@ class PracticeAutopilot:
     def leave(self, link: int) -> None:
         """Forget a link that closed."""
         self._telemetry.leave(link)
+        self._log_server.leave(link)
 
     def receive(self, message: Message, peer: Peer, now_s: float) -> list[Outgoing]:
         """Return the answers to one message.
@@ -144,9 +176,11 @@ class PracticeAutopilot:
         now_s : float
             Wall clock, seconds from any origin.
         """
-        if not self.is_for_me(message):
+        if not self.is_for_me(message) or self.link_lost:
             return []
         name = message.get_type()
+        if name == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
+            self.flight.station_heard = True
         if name == "MISSION_SET_CURRENT":
             return self._set_current(message.seq, peer)
         if name.startswith("MISSION_"):
@@ -155,6 +189,11 @@ class PracticeAutopilot:
             return self._commands.receive(message, peer) + self._said()
         if name in ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"):
             return self.parameters.receive(message, peer)
+        if name in REQUESTS:
+            return self._log_server.receive(message, peer, armed=self.flight.armed)
+        if name == "NAMED_VALUE_FLOAT":
+            sender = (peer.system, peer.component)
+            self._log.named_value(NamedValue(message.time_boot_ms, message.name, message.value, *sender))
         if name == "REQUEST_DATA_STREAM":
             rate = message.req_message_rate if message.start_stop else 0
             self._telemetry.request_group(peer.link, message.req_stream_id, rate)
@@ -165,16 +204,16 @@ class PracticeAutopilot:
 
     def advance(self, until_s: float, now_s: float) -> list[Outgoing]:
         """Let simulated time run in fixed steps until `until_s`; returns what was sent on the way, in order."""
-        out = self._transfers.advance(now_s)
+        out = self._on_air(self._transfers.advance(now_s) + self._log_server.advance(now_s, armed=self.flight.armed))
         while (self._steps + 1) * STEP_S <= until_s + 1e-9:
             self._steps += 1
             self.flight.step(self._steps * STEP_S - self.flight.time_s)
-            out += self._said()
-            out += self._after_step()
+            self._failsafes.step()
+            out += self._on_air(self._said() + self._after_step())
         # One a second by either clock: a slowed-down flight still shows that it lives.
         if self.time_s - self._beat_s >= 1.0 or now_s - self._beat_wall_s >= 1.0:
             self._beat_s, self._beat_wall_s = self.time_s, now_s
-            out.append(Outgoing(heartbeat(self.flight)))
+            out += self._on_air([Outgoing(heartbeat(self.flight))])
         return out
 
     def is_for_me(self, message: Message) -> bool:
@@ -183,28 +222,36 @@ class PracticeAutopilot:
         return system in (0, self.settings.system) and component in (0, COMPONENT)
 
     def _after_step(self) -> list[Outgoing]:
+        self._log.step()
         out = self._telemetry.due()
         if self._current != self.flight.navigator.current:
-            self._current = self.flight.navigator.current
+            self._current = self.store.current = self.flight.navigator.current
             out.append(Outgoing(mission_current(self.flight)))
         if self._sensor is not None:
             lon, lat = self.flight.lon_lat_deg
             value = self._sensor.step(lon, lat, self.time_s)
-            if value is not None:
-                name = self.settings.sensor.name.encode()
-                out.append(Outgoing(mavlink.MAVLink_named_value_float_message(boot_ms(self.flight), name, value)))
+            if value is not None and not during(self.settings.troubles.silent_sensor, self.flight.flown_s):
+                now_ms, name = boot_ms(self.flight), self.settings.sensor.name
+                out.append(Outgoing(mavlink.MAVLink_named_value_float_message(now_ms, name.encode(), value)))
+                self._log.named_value(NamedValue(now_ms, name, value, self.settings.system, COMPONENT))
                 self.samples.append(Sample(self.time_s, lon, lat, self.flight.motion.up_m, value))
         return out
 
     def _set_current(self, seq: int, peer: Peer) -> list[Outgoing]:
         if not self.flight.set_current(seq):
             return self._said()
-        self._current = self.flight.navigator.current
+        self._current = self.store.current = self.flight.navigator.current
         # ArduPilot answers with the number that was asked for, home's too.
         message = mission_current(self.flight)
         message.seq = seq
         return [Outgoing(message, peer.link)]
 
+    def _on_air(self, out: list[Outgoing]) -> list[Outgoing]:
+        return [] if self.link_lost else out
+
     def _said(self) -> list[Outgoing]:
         out, self.flight.outbox = self.flight.outbox, []
+        for one in out:
+            if one.message.get_type() == "STATUSTEXT":
+                self._log.text(one.message.severity, one.message.text)
         return out

@@ -1,4 +1,4 @@
-"""The battery of the practice vehicle: empty after the profile's endurance in the air."""
+"""The battery of the practice vehicle: empty after the profile's endurance in the air, sooner against a wind."""
 
 from __future__ import annotations
 
@@ -9,6 +9,22 @@ CELLS = 4
 CAPACITY_MAH = 10_000
 IDLE_SHARE = 0.1
 LOW = 0.15
+CRITICAL = 0.05
+# Of the power at cruise, what lifts; the rest overcomes drag and grows with the cube of the airspeed.
+LIFTING_SHARE = 0.8
+
+
+def flying_draw(airspeed_m_s: float, cruise_m_s: float) -> float:
+    """Return what flying takes beside what it takes at cruise.
+
+    Up to the cruise airspeed 1, so that a flight without wind lasts as long as the profile and the plan say.
+
+    Examples
+    --------
+    >>> flying_draw(0.0, 10.0), round(flying_draw(15.0, 10.0), 3)
+    (1.0, 1.475)
+    """
+    return max(1.0, LIFTING_SHARE + (1.0 - LIFTING_SHARE) * (airspeed_m_s / cruise_m_s) ** 3)
 
 
 @dataclass
@@ -35,6 +51,11 @@ class Battery:
         return self.level < LOW
 
     @property
+    def critical(self) -> bool:
+        """Whether it is time to land where it is."""
+        return self.level < CRITICAL
+
+    @property
     def percent(self) -> int:
         """What is left, rounded up."""
         return math.ceil(self.level * 100.0)
@@ -59,7 +80,11 @@ class Battery:
         """How long it lasts in the air."""
         return int(self.level * self.endurance_s)
 
-    def use(self, dt_s: float, *, flying: bool) -> None:
-        """Let `dt_s` seconds pass with the motors on."""
-        self.draw = 1.0 if flying else IDLE_SHARE
+    def run_low(self) -> None:
+        """Fall to just below what counts as low."""
+        self.level = min(self.level, 0.99 * LOW)
+
+    def use(self, dt_s: float, draw: float = IDLE_SHARE) -> None:
+        """Let `dt_s` seconds pass with the motors on; `draw` is a share of what cruising takes."""
+        self.draw = draw
         self.level = max(0.0, self.level - self.draw * dt_s / self.endurance_s)

@@ -1,11 +1,13 @@
 """Whether the vehicle is where its fence lets it be.
 
 ArduPilot watches when FENCE_ENABLE is 1, and then what FENCE_TYPE says: 1 altitude, 2 the circle round home,
-4 polygons. PX4 watches unless GF_ACTION is 0.
+4 polygons. PX4 watches unless GF_ACTION is 0; it wants the vehicle inside all inclusions, as ArduPilot does, and
+leaves out an area that home is on the wrong side of (PX4 v1.15 geofence.cpp).
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from sparsor.link.practice.storage import CIRCLES, FENCE, POLYGONS
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
     from sparsor.link.practice.transfer import MissionStore
 
 Corners = list[tuple[float, float]]
+Area = tuple[bool, Corners, float]
+"""Whether the vehicle has to be inside, the corners in metres round home, and the radius of a circle's one."""
+HOME = (0.0, 0.0)
 INCLUSIONS = frozenset({5001, 5003})
 ALTITUDE, CIRCLE, POLYGON = 1, 2, 4
 
@@ -32,24 +37,28 @@ class FenceWatch:
     place : FlatMap
         Round home.
     px4 : bool
-        PX4 wants the vehicle inside one of the inclusion areas, ArduPilot inside all.
+        Whose parameters it is.
     """
 
     def __init__(self, store: MissionStore, parameters: Parameters, place: FlatMap, *, px4: bool) -> None:
         self._store, self._parameters, self._place, self._px4 = store, parameters, place, px4
-        self._areas: list[tuple[bool, Corners, float]] = []
+        self._areas: list[Area] = []
         self._known = -1
         self.breached = False
         self.breaches = 0
 
     def outside(self, motion: Motion) -> str | None:
         """Return which fence the vehicle is outside of, None for none."""
+        return self.shuts_out(motion.east_m, motion.north_m, motion.up_m)
+
+    def shuts_out(self, east_m: float, north_m: float, up_m: float) -> str | None:
+        """Return which fence a place is outside of, None for none; metres east, north and above home."""
         types, most_up_m, most_away_m = self._watched()
-        if types & ALTITUDE and 0 < most_up_m < motion.up_m:
+        if types & ALTITUDE and 0 < most_up_m < up_m:
             return "altitude"
-        if types & CIRCLE and 0 < most_away_m < motion.distance_m(0.0, 0.0):
+        if types & CIRCLE and 0 < most_away_m < math.hypot(east_m, north_m):
             return "circle"
-        return "polygon" if types & POLYGON and self._outside_areas(motion) else None
+        return "polygon" if types & POLYGON and self._outside_areas((east_m, north_m)) else None
 
     def crossed(self, motion: Motion) -> str | None:
         """Return which fence the vehicle has left since the last look, None for none."""
@@ -67,27 +76,35 @@ class FenceWatch:
         types = int(values["FENCE_TYPE"]) if values["FENCE_ENABLE"] else 0
         return types, values["FENCE_ALT_MAX"], values["FENCE_RADIUS"]
 
-    def _outside_areas(self, motion: Motion) -> bool:
+    def _outside_areas(self, at: tuple[float, float]) -> bool:
         if self._known != self._store.changes[FENCE]:
             self._known = self._store.changes[FENCE]
-            self._areas = list(_areas(self._store.items[FENCE], self._place))
-        at = (motion.east_m, motion.north_m)
-        inside = [(inclusion, _is_inside(at, corners, radius_m)) for inclusion, corners, radius_m in self._areas]
-        inclusions = [found for inclusion, found in inside if inclusion]
-        kept_in = not inclusions or (any(inclusions) if self._px4 else all(inclusions))
-        return not kept_in or any(found for inclusion, found in inside if not inclusion)
+            areas = _areas(self._store.items[FENCE], self._place)
+            self._areas = [area for area in areas if not self._px4 or _allows(area, HOME)]
+        return not all(_allows(area, at) for area in self._areas)
 
 
-def _areas(items: list[StoredItem], place: FlatMap) -> list[tuple[bool, Corners, float]]:
+def leaves_out(items: list[StoredItem], place: FlatMap) -> bool:
+    """Whether an area of a fence has the origin of `place` on the wrong side."""
+    return not all(_allows(area, HOME) for area in _areas(items, place))
+
+
+def _areas(items: list[StoredItem], place: FlatMap) -> list[Area]:
     found, at = [], 0
     while at < len(items):
         item = items[at]
         count = int(item.params[0]) if item.command in POLYGONS else 1
         corners = [place.metres(one.lon_deg, one.lat_deg) for one in items[at : at + count]]
         if item.command in POLYGONS | CIRCLES:
-            found.append((item.command in INCLUSIONS, corners, item.params[0]))
+            # A polygon that ends too early, which PX4 takes, holds nothing.
+            found.append((item.command in INCLUSIONS, corners if len(corners) == count else [], item.params[0]))
         at += count
     return found
+
+
+def _allows(area: Area, at: tuple[float, float]) -> bool:
+    inclusion, corners, radius_m = area
+    return _is_inside(at, corners, radius_m) == inclusion
 
 
 def _is_inside(at: tuple[float, float], corners: Corners, radius_m: float) -> bool:

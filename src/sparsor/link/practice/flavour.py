@@ -1,6 +1,7 @@
 """How the two flavours differ: numbers, modes, habits, parameters.
 
-ArduPilot's values were seen on ArduCopter 4.6 in SITL; PX4's are from its sources (docs/practice-autopilot.md).
+ArduPilot's values were seen on ArduCopter 4.6 in SITL; PX4's are from its sources, a multicopter's defaults
+(rc.mc_defaults; docs/practice-autopilot.md).
 """
 
 from __future__ import annotations
@@ -118,6 +119,8 @@ ARDUPILOT = Flavour(
         ("FENCE_RADIUS", 300, _REAL32),
         ("FENCE_TOTAL", 0, _INT8),
         ("FENCE_TYPE", 7, _INT8),
+        ("FS_GCS_ENABLE", 0, _INT8),
+        ("FS_GCS_TIMEOUT", 5, _REAL32),
         ("MIS_OPTIONS", 0, mavlink.MAV_PARAM_TYPE_INT16),
         ("MIS_RESTART", 0, _INT8),
         ("MIS_TOTAL", 0, mavlink.MAV_PARAM_TYPE_INT16),
@@ -154,15 +157,18 @@ PX4 = Flavour(
         ("MAV_SYS_ID", 1, _INT32),
         ("COM_DISARM_LAND", 2, _REAL32),
         ("COM_DISARM_PRFLT", 10, _REAL32),
+        ("COM_DL_LOSS_T", 10, _INT32),
         ("GF_ACTION", 2, _INT32),
         ("GF_MAX_HOR_DIST", 0, _REAL32),
         ("GF_MAX_VER_DIST", 0, _REAL32),
         ("MIS_DIST_1WP", 10000, _REAL32),
         ("MIS_TAKEOFF_ALT", 2.5, _REAL32),
+        ("MIS_TKO_LAND_REQ", 0, _INT32),
         ("MPC_ACC_HOR", 3, _REAL32),
         ("MPC_XY_CRUISE", 5, _REAL32),
-        ("NAV_ACC_RAD", 10, _REAL32),
-        ("RTL_RETURN_ALT", 60, _REAL32),
+        ("NAV_ACC_RAD", 2, _REAL32),
+        ("NAV_DLL_ACT", 0, _INT32),
+        ("RTL_RETURN_ALT", 30, _REAL32),
     ),
 )
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sparsor.link.practice.battery import IDLE_SHARE, flying_draw
 from sparsor.link.practice.exchange import Outgoing
 from sparsor.link.practice.flavour import Mode
 from sparsor.link.practice.motion import Aim
@@ -16,6 +19,9 @@ ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 FAILED: int = mavlink.MAV_RESULT_FAILED
 DENIED: int = mavlink.MAV_RESULT_DENIED
 TEMPORARILY_REJECTED: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+BLIND = (Mode.MANUAL, Mode.LAND)
+# A gust is soon over and is not worth a word.
+BLOWN_FOR_S, WIND_SAID_EVERY_S = 3.0, 30.0
 
 
 class Flight(FlightState):
@@ -54,6 +60,8 @@ class Flight(FlightState):
         if mode is None:
             return DENIED
         fault = mission_fault(self) if mode is Mode.MISSION else None
+        if self.position_lost and mode not in BLIND:
+            fault = self._needs_position(mode)
         if fault:
             self.say(fault, mavlink.MAV_SEVERITY_WARNING)
             return TEMPORARILY_REJECTED if self.flavour.is_px4 else FAILED
@@ -109,17 +117,29 @@ class Flight(FlightState):
     def step(self, dt_s: float) -> None:
         """Let `dt_s` seconds pass."""
         self.time_s += dt_s
+        self.wind.step(dt_s)
         self._follow_changes()
-        if not self.armed:
-            return
-        self._use_battery(dt_s)
+        if self.armed:
+            self._fly(dt_s)
+        self._keep_position()
+
+    def _fly(self, dt_s: float) -> None:
+        flying = not self.landed
+        self.battery.use(dt_s, flying_draw(self.motion.airspeed_m_s, self.vehicle.cruise_m_s) if flying else IDLE_SHARE)
         aim = self._aim()
         if not self.landed or (aim.up_m > 0.1 and not aim.landing):
-            self.motion.step(aim, dt_s)
+            self.motion.step(replace(aim, adrift=True) if self.position_lost else aim, dt_s)
             self._touch(aim)
             self._watch_fence()
+            self._watch_wind()
         if self.landed:
             self._disarm_on_ground()
+
+    def _needs_position(self, mode: Mode) -> str:
+        title = self.flavour.mode_title(mode)
+        if self.flavour.is_px4:
+            return f"Switching to {title} is currently not available"
+        return f"Mode change to {title} failed: requires position"
 
     def _aim(self) -> Aim:
         motion = self.motion
@@ -152,6 +172,8 @@ class Flight(FlightState):
     def _touch(self, aim: Aim) -> None:
         if self.landed and self.motion.up_m > 0.05:
             self.landed = False
+            if self.took_off_s is None:
+                self.took_off_s = self.time_s
         elif not self.landed and aim.landing and self.motion.up_m <= 0.0:
             self.landed = True
             self._landed_s = self.time_s
@@ -160,7 +182,7 @@ class Flight(FlightState):
             self.say("Landing detected" if self.flavour.is_px4 else "SIM Hit ground at 0.5 m/s")
 
     def _disarm_on_ground(self) -> None:
-        done = self.mode in (Mode.RETURN, Mode.LAND) or (self.navigator.finished and self.mode is not Mode.MANUAL)
+        done = self.mode in (Mode.RETURN, Mode.LAND) or (self.mission_started and self.navigator.finished)
         # A mission that ended on the ground disarms at once; motors that idle stop after a while.
         wait = self.flavour.disarm_s if done else self.parameters.get("DISARM_DELAY", 10.0)
         if self.flavour.is_px4 and not done:
@@ -170,13 +192,13 @@ class Flight(FlightState):
                 self.say("Mission complete, disarming")
             self.disarm()
 
-    def _use_battery(self, dt_s: float) -> None:
-        self.battery.use(dt_s, flying=not self.landed)
-        if self.battery.low and not self._low_said:
-            self._low_said = True
-            self.say("Battery low: returning", mavlink.MAV_SEVERITY_CRITICAL)
-            if not self.landed and self.mode not in (Mode.LAND, Mode.RETURN):
-                self.set_mode(Mode.RETURN)
+    def _watch_wind(self) -> None:
+        """Say it when the wind has been the stronger one for a while."""
+        if self.landed or not self.motion.overpowered:
+            self._blown_since_s = self.time_s
+        elif self.time_s - max(self._blown_since_s + BLOWN_FOR_S, self._wind_said_s + WIND_SAID_EVERY_S) >= 0:
+            self._wind_said_s = self.time_s
+            self.say(f"Wind {self.wind.speed_m_s:.0f} m/s: too strong, drifting", mavlink.MAV_SEVERITY_CRITICAL)
 
     def _watch_fence(self) -> None:
         crossed = None if self.landed else self.fence.crossed(self.motion)

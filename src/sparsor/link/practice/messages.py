@@ -40,30 +40,35 @@ def boot_ms(flight: Flight) -> int:
     return round(flight.time_s * 1000.0) & 0xFFFFFFFF
 
 
-def _position(flight: Flight) -> tuple[int, int, int, int]:
-    """Return latitude and longitude (1e-7 degrees) and heights above the sea and home (mm); zeros without a fix."""
-    if not flight.has_fix:
-        return 0, 0, 0, 0
-    lon, lat = flight.lon_lat_deg
-    up = flight.motion.up_m
-    return round(lat * 1e7), round(lon * 1e7), round((flight.home_amsl_m + up) * 1000), round(up * 1000)
-
-
 def _global_position(flight: Flight, _: float) -> Message:
-    motion = flight.motion
-    speeds = (round(value * 100) for value in (motion.north_m_s, motion.east_m_s, -motion.up_m_s))
+    """Return GLOBAL_POSITION_INT; without a position PX4 sends none, ArduPilot the last one that it had."""
+    motion, up_mm = flight.motion, round(flight.motion.up_m * 1000)
+    if flight.position_lost and flight.flavour.is_px4:
+        return None
+    if flight.last_estimate is None:
+        place = (0, 0, 0, 0)
+    else:
+        lon, lat = flight.last_estimate
+        place = (round(lat * 1e7), round(lon * 1e7), round(flight.home_amsl_m * 1000) + up_mm, up_mm)
+    level = (0.0, 0.0) if flight.position_lost else (motion.north_m_s, motion.east_m_s)
+    speeds = (round(value * 100) for value in (*level, -motion.up_m_s))
     heading = round(math.degrees(motion.heading_rad) * 100) % 36_000
-    return mavlink.MAVLink_global_position_int_message(boot_ms(flight), *_position(flight), *speeds, heading)
+    return mavlink.MAVLink_global_position_int_message(boot_ms(flight), *place, *speeds, heading)
 
 
 def _gps(flight: Flight, _: float) -> Message:
-    fix = mavlink.GPS_FIX_TYPE_3D_FIX if flight.has_fix else mavlink.GPS_FIX_TYPE_NO_FIX
-    lat, lon, alt, _up = _position(flight)
-    speed = round(flight.motion.ground_speed_m_s * 100)
-    course = round(math.degrees(flight.motion.heading_rad) * 100) % 36_000
-    satellites = 12 if flight.has_fix else 0
-    time_us = round(flight.time_s * 1e6)
-    return mavlink.MAVLink_gps_raw_int_message(time_us, fix, lat, lon, alt, 80, 120, speed, course, satellites)
+    """Return GPS_RAW_INT; without a fix at the place of the last one."""
+    motion, time_us = flight.motion, round(flight.time_s * 1e6)
+    lon, lat, up = flight.last_fix or (0.0, 0.0, 0.0)
+    amsl = flight.home_amsl_m + up if flight.last_fix else 0.0
+    place = round(lat * 1e7), round(lon * 1e7), round(amsl * 1000)
+    if not flight.has_fix:
+        unknown = 0xFFFF
+        return mavlink.MAVLink_gps_raw_int_message(
+            time_us, mavlink.GPS_FIX_TYPE_NO_FIX, *place, unknown, unknown, unknown, unknown, 0
+        )
+    speed, course = round(motion.ground_speed_m_s * 100), round(math.degrees(motion.course_rad) * 100) % 36_000
+    return mavlink.MAVLink_gps_raw_int_message(time_us, mavlink.GPS_FIX_TYPE_3D_FIX, *place, 80, 120, speed, course, 12)
 
 
 def _attitude(flight: Flight, _: float) -> Message:
@@ -77,7 +82,7 @@ def _hud(flight: Flight, _: float) -> Message:
     speed, heading = motion.ground_speed_m_s, round(math.degrees(motion.heading_rad)) % 360
     throttle = 0 if flight.landed else 50
     return mavlink.MAVLink_vfr_hud_message(
-        speed, speed, heading, throttle, flight.home_amsl_m + motion.up_m, motion.up_m_s
+        motion.airspeed_m_s, speed, heading, throttle, flight.home_amsl_m + motion.up_m, motion.up_m_s
     )
 
 
@@ -120,7 +125,7 @@ def mission_current(flight: Flight, _: float = 0.0) -> Message:
 
 
 def _system_time(flight: Flight, boot_unix_s: float) -> Message:
-    unix_us = round((boot_unix_s + flight.time_s) * 1e6) if flight.has_fix else 0
+    unix_us = round((boot_unix_s + flight.time_s) * 1e6) if flight.clock_set else 0
     return mavlink.MAVLink_system_time_message(unix_us, boot_ms(flight))
 
 
@@ -158,6 +163,20 @@ def _version(flight: Flight, _: float) -> Message:
     return mavlink.MAVLink_autopilot_version_message(can, flight.flavour.version, 0, 0, 0, none, none, none, 0, 0, 1)
 
 
+def _wind(flight: Flight, _: float) -> Message:
+    """Return WIND, which ArduPilot sends."""
+    return mavlink.MAVLink_wind_message(flight.wind.from_deg, flight.wind.speed_m_s, 0.0)
+
+
+def _wind_cov(flight: Flight, _: float) -> Message:
+    """Return WIND_COV, which PX4 sends; the estimate is the wind itself."""
+    wind, up_m = flight.wind, flight.home_amsl_m + flight.motion.up_m
+    spread = wind.settings.gusts_m_s**2
+    return mavlink.MAVLink_wind_cov_message(
+        round(flight.time_s * 1e6), wind.north_m_s, wind.east_m_s, 0.0, spread, 0.0, up_m, 0.0, 0.0
+    )
+
+
 BUILDERS: dict[int, Callable[[Flight, float], Message]] = {
     1: _system_status,
     2: _system_time,
@@ -169,6 +188,10 @@ BUILDERS: dict[int, Callable[[Flight, float], Message]] = {
     147: _battery,
     148: _version,
     162: _fence,
+    168: _wind,
+    231: _wind_cov,
     242: _home,
     245: _extended_state,
 }
+OTHERS = {"ardupilot": frozenset({231}), "px4": frozenset({168})}
+"""What each flavour does not have."""

@@ -1,4 +1,10 @@
-"""Following an uploaded mission, item by item."""
+"""Following an uploaded mission, item by item.
+
+Flown: take-offs, waypoints, loiters, delays, landings, return to launch, jumps and changes of the ground speed. A
+loiter of some turns is waited out at its centre, as long as ArduPilot circles (CIRCLE_RATE). From the ground, a
+waypoint begins with a vertical take-off to its height, as in PX4. Everything else (CONDITION_*, cameras, servos, a
+delay until a time of the day) is passed over at once.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +12,14 @@ import math
 from typing import TYPE_CHECKING
 
 from sparsor.link.practice.motion import Aim
-from sparsor.link.practice.storage import PLACED, waits_s
 from sparsor.mission.items import (
     DO_CHANGE_SPEED,
     FLOWN_TO,
     FRAME_GLOBAL,
     LANDINGS,
     NAV_DELAY,
+    NAV_LOITER_TIME,
+    NAV_LOITER_TURNS,
     NAV_LOITER_UNLIM,
     NAV_RETURN_TO_LAUNCH,
     NAV_WAYPOINT,
@@ -26,6 +33,9 @@ if TYPE_CHECKING:
     from sparsor.vehicle import Vehicle
 
 DO_JUMP = 177
+AIRSPEED, GROUND_SPEED = 0, 1  # SPEED_TYPE; the others are of climbing and sinking
+TURN_S = 360.0 / 20.0
+LEAST_TAKE_OFF_M = 2.5  # PX4's MIS_TAKEOFF_ALT
 STRAIGHT_RAD = math.radians(15.0)
 HEIGHT_M = 1.0
 
@@ -70,6 +80,7 @@ class Navigator:
         self._arrived_s: float | None = None
         self._jumps: dict[int, int] = {}
         self._start: tuple[float, float] | None = None
+        self._lift_m: float | None = None
 
     @property
     def finished(self) -> bool:
@@ -97,6 +108,10 @@ class Navigator:
                 continue
             if self._start is None:
                 self._start = (motion.east_m, motion.north_m)
+                self._lift_m = self._height_to_lift_to(item) if landed else None
+            if self._lift_m is not None and motion.up_m < self._lift_m - 0.5 * HEIGHT_M:
+                return Aim(*self._start, self._lift_m, self.speed_m_s), reached
+            self._lift_m = None
             if not self._done(item, motion, now_s, landed=landed):
                 return self._aim(item, motion), reached
             reached.append(self.current)
@@ -105,11 +120,7 @@ class Navigator:
 
     def target(self, seq: int) -> tuple[float, float, float] | None:
         """Return metres east, north and up of an item, None for one without a position."""
-        item = self.items[seq]
-        if item.command not in PLACED or (item.x, item.y) == (0, 0):
-            return None
-        up = item.z - self._home_amsl_m if item.frame == FRAME_GLOBAL else item.z
-        return (*self._place.metres(item.lon_deg, item.lat_deg), up)
+        return target_of(self.items[seq], self._place, self._home_amsl_m)
 
     def radius_m(self, item: StoredItem) -> float:
         """Return how near to an item counts as reached."""
@@ -119,13 +130,19 @@ class Navigator:
     def _do(self, item: StoredItem) -> None:
         seq = self.current
         self.jump_to(seq + 1)
-        if item.command == DO_CHANGE_SPEED and item.params[1] > 0:
+        if item.command == DO_CHANGE_SPEED and item.params[0] in (AIRSPEED, GROUND_SPEED) and item.params[1] > 0:
             self.speed_m_s = item.params[1]
         if item.command == DO_JUMP and 0 <= int(item.params[0]) < len(self.items):
             done = self._jumps.get(seq, 0)
             if item.params[1] < 0 or done < item.params[1]:
                 self._jumps[seq] = done + 1
                 self.jump_to(int(item.params[0]))
+
+    def _height_to_lift_to(self, item: StoredItem) -> float | None:
+        target = self.target(self.current)
+        if target is None or item.command in TAKE_OFFS | LANDINGS:
+            return None
+        return max(target[2], LEAST_TAKE_OFF_M)
 
     def _aim(self, item: StoredItem, motion: Motion) -> Aim:
         target = self.target(self.current)
@@ -172,3 +189,21 @@ class Navigator:
         if abs((turn + math.pi) % (2 * math.pi) - math.pi) < STRAIGHT_RAD:
             return self.speed_m_s
         return min(self.speed_m_s, math.sqrt(self._vehicle.acceleration_m_s2 * self.radius_m(item)))
+
+
+def target_of(item: StoredItem, place: FlatMap, home_amsl_m: float) -> tuple[float, float, float] | None:
+    """Return metres east, north and above home of an item, None for one that is not flown to."""
+    if item.command not in FLOWN_TO or (item.x, item.y) == (0, 0):
+        return None
+    up = item.z - home_amsl_m if item.frame == FRAME_GLOBAL else item.z
+    return (*place.metres(item.lon_deg, item.lat_deg), up)
+
+
+def waits_s(item: StoredItem) -> float:
+    """Return how long the vehicle stays at an item, seconds."""
+    first = item.params[0]
+    if not first > 0:
+        return 0.0
+    if item.command == NAV_LOITER_TURNS:
+        return first * TURN_S
+    return first if item.command in (NAV_WAYPOINT, NAV_LOITER_TIME, NAV_DELAY) else 0.0

@@ -5,14 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sparsor.core.streams import stream
 from sparsor.errors import InputError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 TAU_PER_T90 = 1.0 / math.log(10.0)
 Truth = Callable[[float, float], float]
@@ -111,53 +106,3 @@ class PracticeSensor:
         if lost < settings.drop_out_fraction:
             return None
         return self._level + self._drift + settings.noise_ppb * float(noise)
-
-
-@dataclass(frozen=True)
-class RasterTruth:
-    """A field on a raster as a truth to fly through: bilinear between cell centres, its edge beyond.
-
-    Parameters
-    ----------
-    values : array of float64 (rows, columns)
-        s; row 0 northmost.
-    box : tuple of float
-        West, south, east, north outer edges, degrees.
-    """
-
-    values: NDArray[np.float64]
-    box: tuple[float, float, float, float]
-
-    def __call__(self, lon_deg: float, lat_deg: float) -> float:
-        """Return s at a place."""
-        west, south, east, north = self.box
-        rows, columns = self.values.shape
-        across = ((lon_deg - west + 180.0) % 360.0 - 180.0) / (east - west) * columns - 0.5
-        down = (north - lat_deg) / (north - south) * rows - 0.5
-        across = min(max(across, 0.0), columns - 1.000001)
-        down = min(max(down, 0.0), rows - 1.000001)
-        left, top = int(across), int(down)
-        x, y = across - left, down - top
-        corner = self.values[top : top + 2, left : left + 2]
-        upper = corner[0, 0] * (1 - x) + corner[0, 1] * x
-        lower = corner[1, 0] * (1 - x) + corner[1, 1] * x
-        return float(upper * (1 - y) + lower * y)
-
-
-def built_in_truth(lon_deg: float, lat_deg: float, side_m: float = 8000.0, cells: int = 256) -> RasterTruth:
-    """Return the built-in synthetic field round a place, stretched so that s runs from 0 to 1 over it.
-
-    Raises
-    ------
-    FieldError
-        When the place is not in the built-in field's domain (the Gulf region).
-    """
-    from sparsor.link.practice.place import FlatMap
-    from sparsor.prior.synthetic import SyntheticField
-
-    around = FlatMap(lon_deg, lat_deg)
-    west, south = around.degrees(-side_m / 2, -side_m / 2)
-    east, north = around.degrees(side_m / 2, side_m / 2)
-    values = SyntheticField(0).on_raster((west, south, east, north), (cells, cells))
-    low, high = float(values.min()), float(values.max())
-    return RasterTruth((values - low) / (high - low), (west, south, east, north))

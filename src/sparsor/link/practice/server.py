@@ -8,20 +8,21 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from sparsor.errors import InputError, OutputError
+from sparsor.errors import InputError, SparsorError
+from sparsor.link.ports.addresses import Address as UrlAddress
+from sparsor.link.ports.sockets import resolved
 from sparsor.link.practice.autopilot import STEP_S
 from sparsor.link.practice.exchange import Message, Outgoing, Peer
-from sparsor.link.practice.links import UDP_SILENT_S, Link, tcp_sender, udp_sender
+from sparsor.link.practice.links import UDP_SILENT_S, Address, Link, bound, tcp_sender, udp_sender
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from types import TracebackType
 
     from sparsor.link.practice.autopilot import PracticeAutopilot
 
-Address = tuple[str, int]
 Key = Any
-"""What names a link: the address of a UDP peer, or a TCP connection."""
+"""What names a link: a UDP socket and the address of a peer, or a TCP connection."""
 LONGEST_WAIT_S = 0.01
 # What one turn of the loop may simulate: beyond it the flight is slower than asked for, never jerky.
 MOST_PER_TURN_S = 1.0
@@ -37,13 +38,15 @@ class PracticeServer:
     autopilot : PracticeAutopilot
     udp, tcp : tuple of str and int, optional
         Host and port to listen on; port 0 takes a free one.
+    send_to : sequence of (str, int)
+        UDP addresses to send to from the start, as PX4's SITL does to port 14540 and ArduPilot's ``--out`` to 14550.
     speedup : float
         Simulated seconds per second.
 
     Raises
     ------
     InputError
-        When there is nothing to listen on, or the speed-up is out of range.
+        When there is nothing to listen on or send to, a host is not known, or the speed-up is out of range.
     OutputError
         When a port is taken.
     """
@@ -54,10 +57,11 @@ class PracticeServer:
         *,
         udp: Address | None = None,
         tcp: Address | None = None,
+        send_to: Sequence[Address] = (),
         speedup: float = 1.0,
     ) -> None:
-        if udp is None and tcp is None:
-            raise InputError("the practice autopilot needs a UDP or a TCP port to listen on")
+        if udp is None and tcp is None and not send_to:
+            raise InputError("the practice autopilot needs a UDP or a TCP port to listen on, or an address to send to")
         if not 0.01 <= speedup <= 1000:
             raise InputError(f"a speed-up of {speedup:g}; allowed are 0.01..1000")
         self.autopilot = autopilot
@@ -71,9 +75,11 @@ class PracticeServer:
         self._thread: threading.Thread | None = None
         self._lag_s = self._started_s = 0.0
         try:
-            self._udp = self._bound(socket.SOCK_DGRAM, udp) if udp else None
-            self._tcp = self._bound(socket.SOCK_STREAM, tcp) if tcp else None
-        except OutputError:
+            self._udp = self._opened(socket.SOCK_DGRAM, udp) if udp else None
+            self._tcp = self._opened(socket.SOCK_STREAM, tcp) if tcp else None
+            for host, port in send_to:
+                self._send_to(UrlAddress("udpout", host, port))
+        except SparsorError:
             self.close()
             raise
 
@@ -125,18 +131,20 @@ class PracticeServer:
         if wanted_s > self.autopilot.time_s + MOST_PER_TURN_S:
             self._lag_s += wanted_s - self.autopilot.time_s - MOST_PER_TURN_S
             wanted_s = self.autopilot.time_s + MOST_PER_TURN_S
-        self._send(self.autopilot.advance(wanted_s, now_s))
+        self._send(self.autopilot.advance(wanted_s, now_s), now_s)
         for key, link in list(self._links.items()):
-            silent = not isinstance(key, socket.socket) and now_s - link.heard_s > UDP_SILENT_S
-            if silent or not link.flush():
+            link.flush(now_s)
+            if link.gone(now_s, float("inf") if isinstance(key, socket.socket) else UDP_SILENT_S):
                 self._drop(key)
+            else:
+                self._take(link, now_s)
 
     def _read(self, ready: Key) -> None:
         now_s = time.monotonic()
         if ready is self._tcp:
             self._accept(now_s)
-        elif self._udp is not None and ready is self._udp:
-            self._read_datagrams(self._udp, now_s)
+        elif ready.type == socket.SOCK_DGRAM:
+            self._read_datagrams(ready, now_s)
         else:
             try:
                 data = ready.recv(65_536)
@@ -168,13 +176,22 @@ class PracticeServer:
                 return
             except OSError:  # Windows reports a closed peer here
                 continue
-            if address not in self._links:
-                self._join(address, udp_sender(server, address), now_s)
-            self._received(address, data, now_s)
+            key = (server, address)
+            if key not in self._links:
+                self._join(key, udp_sender(server, address), now_s)
+            self._received(key, data, now_s)
 
-    def _join(self, key: Key, send: Callable[[bytes], int], now_s: float) -> None:
+    def _send_to(self, address: UrlAddress) -> None:
+        """Open a link to an address that has not been heard yet, from a port of our own."""
+        family, target = resolved(address, socket.SOCK_DGRAM)
+        server = socket.socket(family, socket.SOCK_DGRAM)
+        server.setblocking(False)
+        self._selector.register(server, selectors.EVENT_READ)
+        self._join((server, target), udp_sender(server, target), time.monotonic(), stays=True)
+
+    def _join(self, key: Key, send: Callable[[bytes], int], now_s: float, *, stays: bool = False) -> None:
         self._made += 1
-        self._links[key] = Link(self._made, self.autopilot.settings.system, send, now_s)
+        self._links[key] = Link(self._made, self.autopilot.settings, send, now_s, stays=stays)
         self.autopilot.join(self._made)
 
     def _drop(self, key: Key) -> None:
@@ -186,42 +203,33 @@ class PracticeServer:
 
     def _received(self, key: Key, data: bytes, now_s: float) -> None:
         link = self._links[key]
-        for message in link.parse(data, now_s):
-            self._pass_on(message, link)
-            peer = Peer(message.get_srcSystem(), message.get_srcComponent(), link.number)
-            self._send(self.autopilot.receive(message, peer, now_s))
+        link.parse(data, now_s)
+        self._take(link, now_s)
 
-    def _pass_on(self, message: Message, source: Link) -> None:
+    def _take(self, link: Link, now_s: float) -> None:
+        """Act on the messages that have arrived on a link."""
+        for message in link.arrived(now_s):
+            self._pass_on(message, link, now_s)
+            peer = Peer(message.get_srcSystem(), message.get_srcComponent(), link.number)
+            self._send(self.autopilot.receive(message, peer, now_s), now_s)
+
+    def _pass_on(self, message: Message, source: Link, now_s: float) -> None:
         """Forward what is not for the vehicle alone: to everybody, or to where its target was heard."""
         target = getattr(message, "target_system", 0)
-        if target == self.autopilot.settings.system and self.autopilot.is_for_me(message):
+        if self.autopilot.link_lost or (target == self.autopilot.settings.system and self.autopilot.is_for_me(message)):
             return
         for link in self._links.values():
             if link is not source and (target == 0 or target in link.systems):
-                link.forward(bytes(message.get_msgbuf()))
+                link.forward(bytes(message.get_msgbuf()), now_s)
 
-    def _send(self, out: Iterable[Outgoing]) -> None:
+    def _send(self, out: Iterable[Outgoing], now_s: float) -> None:
         links = list(self._links.values())
         for one in out:
             for link in links:
                 if one.link is None or one.link == link.number:
-                    link.send(one.message)
+                    link.send(one.message, now_s)
 
-    def _bound(self, kind: socket.SocketKind, address: Address) -> socket.socket:
-        server = socket.socket(socket.AF_INET, kind)
-        if kind == socket.SOCK_STREAM:
-            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            server.bind(address)
-            if kind == socket.SOCK_STREAM:
-                server.listen()
-        except OSError as error:
-            server.close()
-            name = "UDP" if kind == socket.SOCK_DGRAM else "TCP"
-            raise OutputError(
-                f"{name} port {address[1]} of {address[0]} cannot be opened ({error.strerror or error}); "
-                "is another program using it? Give another port"
-            ) from error
-        server.setblocking(False)
+    def _opened(self, kind: socket.SocketKind, address: Address) -> socket.socket:
+        server = bound(kind, address)
         self._selector.register(server, selectors.EVENT_READ)
         return server

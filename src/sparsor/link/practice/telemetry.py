@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sparsor.link.practice.exchange import Message, Outgoing
-from sparsor.link.practice.messages import BUILDERS
+from sparsor.link.practice.messages import BUILDERS, OTHERS
 
 if TYPE_CHECKING:
     from sparsor.link.practice.flight import Flight
@@ -19,11 +19,11 @@ GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_POSITION: (33,),
     mavlink.MAV_DATA_STREAM_EXTRA1: (30,),
     mavlink.MAV_DATA_STREAM_EXTRA2: (74,),
-    mavlink.MAV_DATA_STREAM_EXTRA3: (2, 147),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (2, 147, 168),
 }
 GROUPS[mavlink.MAV_DATA_STREAM_ALL] = tuple(number for group in GROUPS.values() for number in group)
 # Hertz of what PX4 sends unasked.
-UNASKED_HZ = {1: 1.0, 2: 1.0, 24: 1.0, 30: 10.0, 33: 5.0, 42: 1.0, 74: 4.0, 147: 0.5, 242: 0.5, 245: 1.0}
+UNASKED_HZ = {1: 1.0, 2: 1.0, 24: 1.0, 30: 10.0, 33: 5.0, 42: 1.0, 74: 4.0, 147: 0.5, 231: 0.5, 242: 0.5, 245: 1.0}
 FASTEST_HZ = 20.0
 
 
@@ -65,7 +65,7 @@ class Telemetry:
 
     def set_interval(self, link: int, number: int, interval_s: float) -> bool:
         """MAV_CMD_SET_MESSAGE_INTERVAL: below 0 stops, 0 is the usual rate; False for unknown messages."""
-        if number not in BUILDERS or link not in self._links:
+        if not self._has(number) or link not in self._links:
             return False
         streams = self._links[link]
         if interval_s < 0:
@@ -82,9 +82,11 @@ class Telemetry:
         return running.interval_s if running else -1.0
 
     def build(self, number: int) -> Message:
-        """Return a message as it is now, None for one that we do not have."""
-        builder = BUILDERS.get(number)
-        return builder(self._flight, self._boot_unix_s) if builder else None
+        """Return a message as it is now, None for one that we do not have, or not now."""
+        return BUILDERS[number](self._flight, self._boot_unix_s) if self._has(number) else None
+
+    def _has(self, number: int) -> bool:
+        return number in BUILDERS and number not in OTHERS[self._flight.flavour.name]
 
     def due(self) -> list[Outgoing]:
         """Return what is to be sent at this moment of the flight."""
@@ -97,5 +99,6 @@ class Telemetry:
                 running.due_s = max(running.due_s + running.interval_s, now - running.interval_s)
                 if number not in built:
                     built[number] = self.build(number)
-                out.append(Outgoing(built[number], link))
+                if built[number] is not None:
+                    out.append(Outgoing(built[number], link))
         return out

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sparsor.link.practice.exchange import Message, Outgoing, Peer
-from sparsor.link.practice.storage import FENCE, INT_FRAME, KINDS, MISSION, RALLY, StoredItem
+from sparsor.link.practice.storage import FENCE, KINDS, MISSION, RALLY, StoredItem
 
 if TYPE_CHECKING:
     from sparsor.vehicle import Autopilot
@@ -42,18 +42,21 @@ class MissionStore:
     """How often each kind was replaced or cleared."""
     first: int = 0
     """Item to begin with, as the last upload marked it (PX4)."""
+    current: int = 0
+    """Item of the mission that is flown or comes next."""
 
     def most(self, kind: int) -> int:
-        """Return how many items of a kind fit."""
+        """Return how many items of a kind fit; none of a kind that there is not."""
         limits = self.limits
-        return {MISSION: limits.max_items, FENCE: limits.max_fence_points, RALLY: limits.max_rally_points}[kind]
+        most = {MISSION: limits.max_items, FENCE: limits.max_fence_points, RALLY: limits.max_rally_points}
+        return most.get(kind, 0)
 
-    def read(self, kind: int) -> list[StoredItem]:
-        """Return the items of a kind as they are read back."""
+    def item(self, kind: int, seq: int) -> StoredItem | None:
+        """Return one item as it is read back, None where there is none; ArduPilot's home is always there."""
+        if kind == MISSION and seq == 0 and self.limits.home_is_item_0:
+            return self.home
         items = self.items[kind]
-        if kind == MISSION and items and self.limits.home_is_item_0:
-            return [self.home, *items[1:]]
-        return items
+        return items[seq] if seq < len(items) else None
 
     def replace(self, kind: int, items: list[StoredItem]) -> None:
         """Put other items in the place of those of a kind."""
@@ -85,20 +88,19 @@ def count(peer: Peer, items: int, kind: int) -> Outgoing:
     return Outgoing(mavlink.MAVLink_mission_count_message(peer.system, peer.component, items, kind), peer.link)
 
 
-def item_out(peer: Peer, seq: int, kind: int, item: StoredItem, *, integers: bool, px4: bool) -> Outgoing:
+def item_out(peer: Peer, seq: int, kind: int, item: StoredItem, *, integers: bool, current: bool = False) -> Outgoing:
     """Return MISSION_ITEM_INT, or MISSION_ITEM for who asked with the old MISSION_REQUEST.
 
-    PX4 gives an item that was asked for as integers an integer frame (5, 6), whatever it was sent with.
+    The frame is the stored one.
     """
     target = (peer.system, peer.component)
     if integers:
-        frame = INT_FRAME.get(item.frame, item.frame) if px4 and kind == MISSION else item.frame
         place: tuple[float, float] = (item.x, item.y)
         make = mavlink.MAVLink_mission_item_int_message
     else:
-        frame = item.frame
-        scale = 1.0 if frame == mavlink.MAV_FRAME_MISSION else 1e-7
+        scale = 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else 1e-7
         place = (item.x * scale, item.y * scale)
         make = mavlink.MAVLink_mission_item_message
-    message = make(*target, seq, frame, item.command, 0, item.autocontinue, *item.params, *place, item.z, kind)
+    flags = (int(current), item.autocontinue)
+    message = make(*target, seq, item.frame, item.command, *flags, *item.params, *place, item.z, kind)
     return Outgoing(message, peer.link)

@@ -1,0 +1,1 @@
+"""Arming, starting and watching a flight."""

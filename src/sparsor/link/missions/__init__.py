@@ -1,0 +1,1 @@
+"""A plan onto the vehicle and back: the mission protocol, over good links and bad ones."""

@@ -1,0 +1,1 @@
+"""The sockets and serial ports under a link, and the addresses that name them."""

@@ -1,0 +1,1 @@
+"""The vehicle's own logs, fetched by the log protocol."""
