@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sparsor.design.decoders import Measurements
+from sparsor.errors import DesignError
+
+
+def cells(*which):
+    return np.eye(9)[list(which)]
+
+
+@pytest.mark.parametrize(
+    ("weights", "values", "variance", "words"),
+    [
+        (cells(1, 2), [1.0], [0.0, 0.0], "do not fit"),
+        (cells(1), [1.0], [0.0], r"1 measurement\(s\) in 1 cell\(s\).*at least 2 cells"),
+        (cells(1, 1), [1.0, 2.0], [0.0, 0.0], r"2 measurement\(s\) in 1 cell\(s\)"),
+        (cells(1, 2), [1.0, np.nan], [0.0, 0.0], "the values hold something that is not a number"),
+        (cells(1, 2), [1.0, 2.0], [0.0, np.inf], "the variances hold"),
+        (cells(1, 2), [1.0, 2.0], [0.0, -2.0], "noise variance is -2"),
+        (2 * cells(1, 2), [1.0, 2.0], [0.0, 0.0], r"rows that sum to 2\.\.2"),
+        (cells(1, 2) - cells(3, 3) + cells(4, 4), [1.0, 2.0], [0.0, 0.0], "weights from -1"),
+    ],
+)
+def test_what_cannot_be_decoded_is_refused(weights, values, variance, words):
+    with pytest.raises(DesignError, match=words):
+        Measurements(weights, np.array(values), np.array(variance))
+
+
+def test_the_order_does_not_depend_on_the_one_they_came_in():
+    rng = np.random.default_rng(1)
+    weights = np.concatenate([cells(1, 1, 4, 8), rng.dirichlet(np.ones(9), 12)])
+    values, variance = rng.normal(size=16), rng.uniform(0, 1, 16)
+    first = Measurements(weights, values, variance).in_order()
+    for _ in range(5):
+        order = rng.permutation(16)
+        other = Measurements(weights[order], values[order], variance[order]).in_order()
+        np.testing.assert_array_equal(other.weights, first.weights)
+        np.testing.assert_array_equal(other.values, first.values)
+        np.testing.assert_array_equal(other.variance, first.variance)
+    assert sorted(first.values) == sorted(values)
