@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from pymavlink import mavutil
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from threadpoolctl import threadpool_limits
 
 from mission_strategies import KNOWN_HOME
@@ -24,6 +23,7 @@ from sparsor.cli import main
 from sparsor.geodesy.lengths import distance_m
 from sparsor.link.connection import Connection
 from sparsor.link.practice import PracticeAutopilot, PracticeServer, PracticeSettings, built_in_truth, flavour_named
+from sparsor.link.recorder import request_streams
 from sparsor.link.vehicles import find_vehicle
 from sparsor.mission import read_plan
 
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 COMMANDS = {"sparsor": main.main, "generate-mission": main.generate_mission, "upload-mission": main.upload_mission}
-SIDE_DEG = 0.002  # about 200 m
+SIDE_M = 230.0  # the smallest box has 200 m
+PATIENT_S = 300  # a simulator that has just been started, on a slow machine, is ready after a minute or two
 ALTITUDE_M, SPEED_M_S = 20, 8
 RADIUS_M = 3.0  # ArduPilot's WPNAV_RADIUS is 2 m; PX4 looks at the plan's own
 POSITION = "GLOBAL_POSITION_INT"
@@ -51,22 +52,24 @@ class Target:
         """Where it stands, degrees east and north."""
         if self.practice is not None:
             return KNOWN_HOME.lon_deg, KNOWN_HOME.lat_deg
-        asked = mavlink.MAVLink_command_long_message(
-            1, 1, 511, 0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 2e5, *(0,) * 5
-        )
-        with Connection(self.url) as connection, connection.inbox(POSITION) as inbox:
-            for _ in range(60):  # it may still be waiting for its first fix
-                connection.send(asked)
-                for found in inbox.until(time.monotonic() + 1.0):
-                    if found.message.lat:
-                        return found.message.lon / 1e7, found.message.lat / 1e7
+        with Connection(self.url) as connection:
+            vehicle = find_vehicle(connection, None, PATIENT_S)
+            assert not vehicle.armed, vehicle.words
+            with connection.inbox(POSITION, system_id=vehicle.system_id) as inbox:
+                deadline_s = time.monotonic() + PATIENT_S
+                while time.monotonic() < deadline_s:  # it may still be waiting for its first fix
+                    request_streams(connection, vehicle)
+                    for found in inbox.until(time.monotonic() + 2.0):
+                        if found.message.lat:
+                            return found.message.lon / 1e7, found.message.lat / 1e7
         raise AssertionError("it does not say where it is")
 
 
 @pytest.fixture(params=["ardupilot", "px4", pytest.param("sitl", marks=pytest.mark.sitl)])
 def target(request: pytest.FixtureRequest) -> Iterator[Target]:
     if request.param == "sitl":
-        yield Target(os.environ["SPARSOR_SITL_URL"], os.environ.get("SPARSOR_SITL_AUTOPILOT", "ardupilot"))
+        autopilot = os.environ.get("SPARSOR_SITL_AUTOPILOT", "ardupilot").lower()
+        yield Target(os.environ["SPARSOR_SITL_URL"], autopilot)
         return
     truth = built_in_truth(KNOWN_HOME.lon_deg, KNOWN_HOME.lat_deg)
     settings = PracticeSettings(home=KNOWN_HOME, flavour=flavour_named(request.param), truth=truth)
@@ -93,7 +96,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 def plan(run: Any, target: Target) -> dict[str, Any]:
     lon, lat = target.place
-    box = (lon - SIDE_DEG / 2, lat - SIDE_DEG / 2, lon + SIDE_DEG / 2, lat + SIDE_DEG / 2)
+    north = SIDE_M / 2 / 111_320.0
+    east = north / np.cos(np.radians(lat))
+    box = (lon - east, lat - north, lon + east, lat + north)
     return run(
         "generate-mission", "--bbox", *(f"{side:.6f}" for side in box), "--name", "small", "--autopilot",
         target.autopilot, "--home", lon, lat, "--altitude", ALTITUDE_M, "--speed", SPEED_M_S, "--budget", "5%",
@@ -111,7 +116,7 @@ def nearest_m(track: np.ndarray, lon_deg: float, lat_deg: float) -> float:
     return float(np.abs(start + along * step).min())
 
 
-@pytest.mark.timeout(1200)
+@pytest.mark.timeout(1800)
 def test_plan_upload_fly_record_and_download(target, run, tmp_path):
     planned = plan(run, target)
     assert planned["flyable"], planned["warnings"]
@@ -122,7 +127,10 @@ def test_plan_upload_fly_record_and_download(target, run, tmp_path):
     assert sent["verified"]
     assert sent["vehicle_state"] == "new plan"
 
-    flown = run("sparsor", "fly", "missions/small", "--connect", target.url, "--yes", "-o", tmp_path / "flight.tlog")
+    flown = run(
+        "sparsor", "fly", "missions/small", "--connect", target.url, "--yes", "--ready-timeout", PATIENT_S,
+        "-o", tmp_path / "flight.tlog",
+    )  # fmt: skip
     wanted = read_plan(tmp_path / planned["plans"][0]).stops
 
     # The .tlog by a reader that is not ours: the whole flight, past every stop, samples among it.
@@ -153,4 +161,4 @@ def test_plan_upload_fly_record_and_download(target, run, tmp_path):
     assert listed["bytes"] > 1000
 
     with Connection(target.url) as connection:
-        assert not find_vehicle(connection, None, 10.0).armed
+        assert not find_vehicle(connection, None, PATIENT_S).armed

@@ -251,7 +251,7 @@ def test_relative_imports_are_resolved_from_packages_and_modules():
         ("sparsor.design.x", "from sparsor.core.streams import stream\nfrom sparsor.errors import DesignError"),
         ("sparsor.design.x", "from sparsor.design.route import shortest_path"),
         ("sparsor.geodesy.lengths", "def f():\n    from pyproj import Geod"),
-        ("sparsor.link.upload", "def f():\n    import mavsdk"),
+        ("sparsor.link.missions.upload", "def f():\n    import mavsdk"),
         ("sparsor.prior.x", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import rasterio"),
         ("sparsor.prior.x", "def f():\n    import sklearn\nf = lambda: __import__('xarray')"),
         ("sparsor", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from sparsor.design import lasso"),

@@ -167,11 +167,15 @@ def lawnmower(budget, _iterations, _case):
 
 def algorithm_1(budget, iterations, case):
     """Return the cells under the route that the paper's search finds within the budget."""
-    model = case.model
+    return LEGS.cells_under(searched_stops(budget, iterations, case.model))
+
+
+def searched_stops(budget, iterations, model):
+    """Return the stops, in flight order, of the route that the paper's search finds within the budget."""
     limit = Budget(budget * (LEGS.size - 1), "distance")
     problem = Problem(model.dictionary, model.validation - model.mean, model.lasso_weight, LEGS, budget=limit)
     sparsity = searched_sparsity(limit.stops_within(LEGS), LEGS.size, problem.rows)
-    return LEGS.cells_under(search(problem, sparsity, Weights(), seed=0, iterations=iterations).stops)
+    return search(problem, sparsity, Weights(), seed=0, iterations=iterations).stops
 
 
 def cases_of(options):

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from sparsor.geodesy.areas import read_area
     from sparsor.journeys.folder import write_mission
     from sparsor.journeys.learning import LearnRequest, learn_from_fields
+    from sparsor.journeys.mapfiles import write_map
     from sparsor.journeys.planning import plan_mission
+    from sparsor.journeys.reconstructing import ReconstructRequest, reconstruct
     from sparsor.mission import build_mission, plan_bytes, read_plan
     from sparsor.mission.sidecar import read_sidecar
     from sparsor.mission.specification import read_specification, specification
@@ -38,7 +40,9 @@ _HOMES = {
     "sparsor.geodesy.areas": ("read_area",),
     "sparsor.journeys.learning": ("LearnRequest", "learn_from_fields"),
     "sparsor.journeys.folder": ("write_mission",),
+    "sparsor.journeys.mapfiles": ("write_map",),
     "sparsor.journeys.planning": ("plan_mission",),
+    "sparsor.journeys.reconstructing": ("ReconstructRequest", "reconstruct"),
     "sparsor.mission": ("build_mission", "plan_bytes", "read_plan"),
     "sparsor.mission.sidecar": ("read_sidecar",),
     "sparsor.mission.specification": ("read_specification", "specification"),
@@ -56,6 +60,7 @@ __all__ = [
     "LearnRequest",
     "Model",
     "OutputError",
+    "ReconstructRequest",
     "SparsorError",
     "Vehicle",
     "__version__",
@@ -72,9 +77,11 @@ __all__ = [
     "read_plan",
     "read_sidecar",
     "read_specification",
+    "reconstruct",
     "search",
     "shortest_path",
     "specification",
+    "write_map",
     "write_mission",
 ]
 

@@ -67,11 +67,13 @@ class LeftBehindError(LinkFailureError):
     message : str
     vehicle_state : str
         What the vehicle holds or does now.
+    recording : str or None
+        Path of the .tlog of what passed on the link until then.
     """
 
-    def __init__(self, message: str, vehicle_state: str) -> None:
+    def __init__(self, message: str, vehicle_state: str, recording: str | None = None) -> None:
         super().__init__(message)
-        self.vehicle_state = vehicle_state
+        self.vehicle_state, self.recording = vehicle_state, recording
 
 
 class StoppedError(LeftBehindError):

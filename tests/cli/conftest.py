@@ -19,7 +19,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-COMMANDS = {"sparsor": main.main, "generate-mission": main.generate_mission}
+COMMANDS = {
+    "sparsor": main.main,
+    "generate-mission": main.generate_mission,
+    "reconstruct-map": main.reconstruct_map,
+}
 WEST, NORTH, PIXEL_DEG, SIDE = 51.0, 26.0, 0.01, 88
 
 

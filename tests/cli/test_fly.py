@@ -31,6 +31,13 @@ def run(command, *words):
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
+@pytest.fixture(autouse=True)
+def heartbeats_are_quick(monkeypatch):
+    monkeypatch.setattr("sparsor.link.vehicles.OTHERS_S", 0.3)
+    monkeypatch.setattr("sparsor.link.flights.flying.SETTLE_S", 0.4)
+    monkeypatch.setattr("sparsor.link.missions.checks.POSITION_S", 0.3)
+
+
 @pytest.fixture
 def mission(tmp_path):
     folder = tmp_path / "doha"
@@ -61,6 +68,9 @@ def test_a_flight_in_a_table_and_in_one_word(mission):
     with practice() as server:
         ran = run(fly, mission, "--connect", url_of(server), "--yes", "-o", mission / "two.tlog")
     assert re.search(r"outcome +complete", ran.stdout)
+    assert ran.stderr.index("battery: 100 %") < ran.stderr.index("\narmed\n")
+    assert ran.stderr.index("\nlanded\n") < ran.stderr.index("\ndisarmed\n")
+    assert f"reconstruct-map {mission / 'two.tlog'} --plan {mission / 'doha.plan'} --bbox W S E N" in ran.stdout
     assert re.search(r"waypoints +5 reached", ran.stdout)
 
 
@@ -88,12 +98,60 @@ def test_an_upload_starts_when_it_is_asked_to(mission):
 
 
 def test_a_failure_is_one_json_object_too(mission):
-    with practice(speedup=1, ready_s=3000) as server:
+    with practice(speedup=10, ready_s=3000) as server:
         ran = run(fly, mission, "--connect", url_of(server), "--yes", "--json", "--ready-timeout", "1")
     assert ran.exit_code == 1
     failed = json.loads(ran.stdout)
     assert "PreArm" in failed["error"]
     assert failed["vehicle_state"] == "disarmed, it holds the plan"
+    assert failed["tlog"] in {str(path) for path in mission.iterdir()}
+
+
+def test_a_ctrl_c_before_anything_is_sent_is_one_json_object_too(mission, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sparsor.journeys.flying.find_vehicle", interrupt)
+    ran = run(fly, mission, "--connect", "udpout://127.0.0.1:9", "--yes", "--json")
+    assert ran.exit_code == 130
+    assert json.loads(ran.stdout) == {"error": "interrupted", "vehicle_state": "unchanged"}
+    assert [path.suffix for path in mission.iterdir()] == [".plan"]
+
+
+def test_a_file_of_the_mission_that_is_no_plan_is_answered_with_the_folder(mission):
+    (mission / "doha.npz").write_bytes(b"PK")
+    for command in (upload, fly):
+        ran = run(command, mission / "doha.npz", "--connect", "udpout://127.0.0.1:9", *(["--yes"] * (command is fly)))
+        assert ran.exit_code == 2
+        assert f"give the mission folder '{mission}'" in ran.stderr
+
+
+def test_a_plan_for_another_place_is_refused_before_it_is_sent(mission):
+    away = Home(KNOWN_HOME.lon_deg, KNOWN_HOME.lat_deg + 0.5, 12.5, altitude_known=True)
+    (mission / "doha.plan").write_bytes(plan_bytes(example_plan(home=away)))
+    with practice() as server:
+        for command, more in ((fly, ()), (upload, ("--start",))):
+            ran = run(command, mission, "--connect", url_of(server), "--yes", "--json", *more)
+            assert ran.exit_code == 2, ran.output
+            assert "home lies 55" in ran.stderr
+            assert json.loads(ran.stdout)["vehicle_state"] == "unchanged"
+        assert not server.autopilot.flight.armed
+
+
+def test_warnings_come_before_the_motors_even_when_they_are_not_asked_about(mission):
+    away = Home(KNOWN_HOME.lon_deg, KNOWN_HOME.lat_deg + 0.0108, 12.5, altitude_known=True)
+    (mission / "doha.plan").write_bytes(plan_bytes(example_plan(home=away)))
+    with practice(speedup=10) as server:
+        ran = run(upload, mission, "--connect", url_of(server), "--start", "--yes", "-q")
+        assert ran.exit_code == 0, ran.output
+    assert ran.stderr.count("home lies 1.2 km") == 1
+
+
+def test_a_fence_that_is_not_enforced_is_said(mission):
+    with practice() as server:
+        ran = run(upload, mission, "--connect", url_of(server))
+    assert ran.exit_code == 0
+    assert re.search(r"NOT enforced.*--enable-fence", " ".join(ran.stdout.split()))
 
 
 def test_a_home_far_from_the_vehicle_is_said(mission):
@@ -117,7 +175,7 @@ def wait_for(true, running=None):
 def test_a_ctrl_c_in_mid_upload_brings_the_old_plan_back(tmp_path):
     old, new = tmp_path / "old.plan", tmp_path / "new.plan"
     old.write_bytes(plan_bytes(short_plan()))
-    new.write_bytes(plan_bytes(example_plan(stops=60)))
+    new.write_bytes(plan_bytes(example_plan(stops=30)))
     with practice() as server, BadLink(server.udp_port, delay_s=0.05) as link:
         assert run(upload, old, "--connect", url_of(server)).exit_code == 0
         before = list(server.autopilot.store.items[0])

@@ -277,3 +277,24 @@ def test_a_box_across_the_antimeridian(console):
     plan = read_plan(ran.result["plans"][0])
     assert all(abs(stop.lon_deg) > 179.98 for stop in plan.stops)
     assert ran.result["path_length_m"] < 50_000
+
+
+@pytest.mark.usefixtures("no_picture")
+def test_the_sensor_is_told_to_whoever_rebuilds_the_map(console):
+    Path("mine.toml").write_text('name = "mine"\nunit = "ug/m3"\nt90_s = 12.0\n', encoding="utf-8")
+    for options, answer_s, unit in (
+        ((), None, None),
+        (("--t90", 20), 20.0, "ppb"),
+        (("--sensor-profile", "no2"), 30.0, "ppb"),
+        (("--sensor-profile", "mine.toml"), 12.0, "ug/m3"),
+    ):
+        assert console.mission("--name", "m", "--force", *options).code == 0
+        sensor = console("sparsor", "inspect", "missions/m/m.npz", "--json").result["sensor"]
+        assert (sensor and (sensor["t90_s"], sensor["unit"])) == (answer_s and (answer_s, unit))
+    again = console("generate-mission", "missions/m/mission.toml", "--force")  # its path leads back to the profile
+    assert again.code == 0, again.err
+    both = console.mission("--name", "m", "--force", "--t90", 20, "--sensor-profile", "no2")
+    assert both.code == 2
+    assert "--t90" in both.said
+    unknown = console.mission("--name", "m", "--force", "--sensor-profile", "nose")
+    assert (unknown.code, "known are no2" in unknown.said) == (2, True)

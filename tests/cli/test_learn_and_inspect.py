@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flightlog.recorded import recorded_flight
 from sparsor.mission.sidecar import read_sidecar
 from sparsor.prior.model import read_model
 
@@ -158,7 +159,7 @@ def test_inspect_refuses_what_it_does_not_know(console):
     Path("cut.plan").write_text('{"fileType": "Plan"')
     Path("folder").mkdir()
     for file, said in (
-        ("notes.txt", ".plan, .npz (model or sidecar) and .toml"),
+        ("notes.txt", ".plan, .npz (model or sidecar), .toml and flight logs"),
         ("cut.plan", "not a usable plan"),
         ("folder", "without a .plan"),
         ("none.plan", "there is no file"),
@@ -186,3 +187,36 @@ def test_learn_refuses(console, smooth_field, options, said):
     assert ran.code == 2
     assert all(words in ran.err for words in said), ran.err
     assert list(Path().iterdir()) == []
+
+
+def test_a_flight_log_says_what_it_holds(console, tmp_path):
+    flight = recorded_flight("ardupilot", tmp_path)
+    path = tmp_path / "a.tlog"
+    path.write_bytes(flight.tlog[:-3])  # the last record is cut short
+    ran = console("sparsor", "inspect", path)
+    assert ran.code == 0, ran.err
+    assert "a telemetry log (tlog)" in ran.out
+    assert "Vehicles with positions: 1. Heard (system/component): 1/1, 1/191." in ran.out
+    assert "armings: 1." in ran.out
+    assert "broken at 1 places" in ran.out
+    held = console("sparsor", "inspect", path, "--json").result
+    assert (held["kind"], held["log_kind"], held["vehicles"]) == ("log", "tlog", [1])
+    assert {(one["name"], one["sender"]) for one in held["values"]} == {("NO2", "1/1"), ("NO2C", "1/191")}
+    of_companion = next(one for one in held["values"] if one["name"] == "NO2C")
+    assert of_companion["count"] > 30
+    assert of_companion["highest"] > of_companion["lowest"] >= 0
+    (boot,) = held["boots"]
+    assert boot["seconds"] > 30
+    assert held["damage"]["places"] == 1
+
+
+def test_a_table_of_samples_is_a_log_too(console, tmp_path):
+    path = tmp_path / "day.csv"
+    path.write_text("time,lat,lon,alt,NO2\n0,25.28,51.51,30,12.5\n1,25.28,51.51,30,13.5\n")
+    ran = console("sparsor", "inspect", path)
+    assert ran.code == 0, ran.err
+    assert "a table (CSV)" in ran.out
+    assert "2, 12.5 to 13.5" in ran.out
+    (tmp_path / "a.doc").write_text("x")
+    ran = console("sparsor", "inspect", tmp_path / "a.doc")
+    assert (ran.code, "flight logs (.tlog, .BIN, .ulg, .csv)" in ran.said) == (2, True)

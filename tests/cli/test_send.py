@@ -79,6 +79,8 @@ def test_a_recorded_file_is_sent_with_its_named_columns(tmp_path):
         (("--csv", "gone.csv", "--rate", "1"), "cannot read 'gone.csv'"),
         (("--serial", "/dev/no-such-port"), "cannot open|pyserial"),
         (("--serial", "/dev/ttyS0", "--value", "no2"), "give the columns' numbers"),
+        (("-", "--time", "1"), "column 1 is the time: say which column is the value"),
+        (("--csv", "gone.csv"), "cannot read 'gone.csv'"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_before_anything_is_sent(options, words):
@@ -87,9 +89,19 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_sent(options, words)
     assert re.search(words, ran.stderr)
 
 
-def test_no_line_that_can_be_read_is_exit_2_and_no_vehicle_exit_1(tmp_path):
+def test_a_first_line_with_several_names_is_no_place_to_guess(tmp_path):
+    path = tmp_path / "day.csv"
+    path.write_text("time_s,no2_ppb\n0,1.5\n1,2.5\n")
+    for where in (("--csv", path, "--rate", 1), ("--csv", path, "--time", "time_s"), ("-",)):
+        ran = run(*NOWHERE, *where, "--timeout", 0.3, stdin=path.read_text())
+        assert ran.exit_code == 2, ran.output
+        assert "names 2 columns: time_s, no2_ppb. Say which are to be sent, e.g. --value NO2=no2_ppb" in ran.stderr
+
+
+def test_no_line_that_can_be_read_is_exit_2_and_no_vehicle_exit_1(tmp_path, monkeypatch):
+    monkeypatch.setattr("sparsor.link.sensing.outlet.FIND_S", 0.5)  # it ends when that is over
     with VehicleEndpoint() as endpoint:
-        ran = run("--connect", endpoint.url, "-", stdin="time,no2\na,b\n")
+        ran = run("--connect", endpoint.url, "-", "--value", 1, stdin="time,no2\na,b\n")
     assert (ran.exit_code, "no line could be read, the first was 'a,b'" in ran.stderr) == (2, True)
     path = tmp_path / "day.csv"
     path.write_text("1\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -52,11 +53,13 @@ def test_a_mission_folder_is_all_that_it_takes(tmp_path):
     options += ["--wind", "5", "90", "--gusts", "1", "--gps-outage", "60:90", "--gps-outage", "200:210"]
     with subprocess.Popen([sys.executable, "-c", PROGRAM, *options], stdout=subprocess.PIPE, text=True) as running:
         try:
-            lines = [running.stdout.readline() for _ in range(4)]
+            lines = [running.stdout.readline() for _ in range(6)]
             assert "ArduCopter" in lines[0]
             assert "51.5052 25.278" in lines[0]
             assert "sends to 127.0.0.1:9; connect there to udpin://0.0.0.0:9" in lines[2]
             assert str(truth) in lines[3]
+            assert "t90 30 s, noise 1 ppb" in lines[4]
+            assert re.search(rf"sparsor fly {re.escape(str(DOHA))} --connect tcpout://127.0.0.1:\d+$", lines[5].strip())
             assert truth.stat().st_size > 1000
             running.send_signal(signal.SIGINT)
             assert running.wait(timeout=20) == 0
@@ -93,6 +96,7 @@ def test_a_mission_folder_is_all_that_it_takes(tmp_path):
         (("--variable", "NO2"), "--variable only make sense with --field"),
         (("--field-over", "52", "25", "51", "24"), "swapped"),
         (("--no-sensor", "--truth", "t.nc", "--listen", "udp:0"), "without a sensor there is no field to write"),
+        (("--truth", __file__), "is there already; give another name, or --force"),
     ],
 )
 def test_what_is_wrong_is_said(options, sentence):
@@ -117,3 +121,41 @@ def test_home_or_a_mission_is_needed():
 )
 def test_addresses_as_people_type_them(text, found):
     assert command._addresses([text]) == found
+
+
+def test_it_tells_what_happens_unless_it_is_to_be_quiet():
+    for more, told in (((), True), (("-q",), False)):
+        options = [*HOME, "--listen", "tcp:0", "--send-to", "udp:127.0.0.1:9", "--speedup", "20", *more]
+        words = [sys.executable, "-u", "-c", PROGRAM, *options]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+            try:
+                if told:
+                    (port,) = re.findall(
+                        r"tcpout://127.0.0.1:(\d+)", running.stdout.readline() + running.stdout.readline()
+                    )
+                    mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}").close()
+                    lines = [running.stderr.readline() for _ in range(2)]
+                    assert re.fullmatch(r" *[\d.]+ s  client 2 joined \(TCP 127.0.0.1:\d+\)\n", lines[0])
+                    assert "client 2 left" in lines[1]
+                    running.send_signal(signal.SIGTERM)
+                    assert running.wait(timeout=20) == 0
+                else:
+                    running.terminate()
+                    out, err = running.communicate(timeout=20)
+                    assert (out, err) == ("", "")
+            finally:
+                running.kill()
+
+
+def test_a_port_that_is_taken_is_said_with_a_way_out():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        ran = CliRunner().invoke(app, [*HOME, "--listen", f"udp:{taken.getsockname()[1]}"])
+    assert ran.exit_code == 1
+    assert "--listen udp:14560" in ran.output
+    assert "--send-to udp:127.0.0.1:14550" in ran.output
+
+
+def test_what_listens_everywhere_is_connected_to_here():
+    assert command._reachable("0.0.0.0") == "127.0.0.1"
+    assert command._reachable("192.168.1.5") == "192.168.1.5"

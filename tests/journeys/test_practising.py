@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ from sparsor.errors import BoxError, FieldError, InputError, MissionError
 from sparsor.geodesy.lengths import offset_deg
 from sparsor.journeys.practising import FieldRequest, PracticeRequest, prepare_practice, write_truth
 from sparsor.journeys.uploading import upload_mission
-from sparsor.link.practice import PracticeAutopilot, PracticeServer, RasterTruth, truth_netcdf
+from sparsor.link.practice import PracticeAutopilot, PracticeServer, RasterTruth, WindSettings, truth_netcdf
 from sparsor.mission.sidecar import read_sidecar
 from sparsor.prior.reading import read_field
+from sparsor.vehicle import load_sensor
 
 DOHA = Path(__file__).parents[2] / "missions" / "doha"
 BOX = (51.50, 25.27, 51.53, 25.30)
@@ -128,3 +130,25 @@ def test_a_dry_run_says_how_far_the_plan_is_from_the_vehicle(away_m):
         report = upload_mission(DOHA, f"udpout://127.0.0.1:{server.udp_port}", dry_run=True, timeout_s=30)
     said = [warning for warning in report.warnings if "from the vehicle" in warning or "where it is" in warning]
     assert said == ([] if away_m == 0 else ["The plan's home lies 1.0 km from the vehicle."])
+
+
+def test_the_sensor_is_the_one_that_the_mission_was_planned_for(monkeypatch):
+    planned = load_sensor().model_copy(update={"t90_s": 50.0, "noise_sd": 4.0})
+    sidecar = dataclasses.replace(read_sidecar(DOHA / "doha.npz"), sensor=planned)
+    monkeypatch.setattr("sparsor.journeys.practising.read_sidecar", lambda _: sidecar)
+
+    def measured(**asked):
+        sensor = prepare_practice(PracticeRequest(mission=DOHA / "doha.plan", **asked)).settings.sensor
+        return sensor.t90_s, sensor.noise_ppb
+
+    assert measured() == (50.0, 4.0)
+    assert measured(t90_s=0.0) == (0.0, 4.0)
+    assert measured(noise_ppb=0.5) == (50.0, 0.5)
+    planned = planned.model_copy(update={"unit": "mg/m3"})  # whose noise is not one in ppb
+    sidecar = dataclasses.replace(sidecar, sensor=planned)
+    assert measured() == (50.0, 1.0)
+
+
+def test_a_wind_that_it_cannot_fly_against_is_said():
+    (note,) = prepare_practice(PracticeRequest(mission=DOHA, wind=WindSettings(20, 90))).notes
+    assert "more than it flies against (15 m/s)" in note

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from functools import cache
 
 from mission_strategies import KNOWN_HOME, QUAD
 from sparsor.journeys.flying import Choice
@@ -19,10 +20,15 @@ def short_plan(autopilot="ardupilot", stops=STOPS):
     return build_mission(lon, lat, home=KNOWN_HOME, vehicle=QUAD, autopilot=autopilot, altitude_m=12, hold_s=2)
 
 
+@cache
+def _truth():
+    return built_in_truth(LON, LAT)
+
+
 @contextmanager
 def practice(autopilot="ardupilot", *, speedup=60, **settings):
     """Run a practice autopilot that keeps its own track: (east, north, up) metres at each of its steps."""
-    truth = built_in_truth(LON, LAT)
+    truth = _truth()
     made = PracticeSettings(home=KNOWN_HOME, flavour=flavour_named(autopilot), truth=truth, **settings)
     vehicle = PracticeAutopilot(made)
     vehicle.track = []
@@ -55,7 +61,8 @@ class Witness:
     def found(self, vehicle):
         pass
 
-    def confirm(self, _report=None):
+    def confirm(self, report, briefing, _samples):
+        self.report, self.briefing = report, briefing
         return self.yes
 
     def told(self, event):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import socket
 import threading
 import time
@@ -11,7 +12,8 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from link.vehicle_endpoint import PX4, Vehicle, VehicleEndpoint
-from sparsor.errors import InputError, LinkError, LinkFailureError
+from sparsor.core.mavlink_frames import Frame
+from sparsor.errors import InputError, LinkError, LinkFailureError, OutputError
 from sparsor.link.connection import Connection
 from sparsor.link.recorder import record
 from sparsor.link.tlog import TlogWriter
@@ -82,7 +84,7 @@ def test_a_link_without_a_vehicle_says_what_it_heard_within_the_timeout(vehicle,
 def test_a_taken_port_a_closed_one_and_an_unknown_host_are_named():
     with VehicleEndpoint() as endpoint:
         taken = endpoint.socket.getsockname()[1]
-        with pytest.raises(LinkError, match=f"port {taken} is taken"):
+        with pytest.raises(LinkError, match=f"port {taken} is taken.*give udpout://127.0.0.1:{taken}"):
             Connection(f"udpin://127.0.0.1:{taken}")
     with pytest.raises(LinkFailureError, match="nobody answers at tcpout"):
         Connection(f"tcpout://127.0.0.1:{free_port()}", timeout_s=1)
@@ -178,4 +180,30 @@ def test_record_says_when_nothing_comes_and_keeps_an_older_file(tmp_path):
     path.write_bytes(b"older")
     with pytest.raises(LinkError, match="is there already"):
         record(url, path)
+    with pytest.raises(LinkFailureError, match="nothing came"):
+        record(url, path, timeout_s=0.3, replace=True)
     assert path.read_bytes() == b"older"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_recording_replaces_another_when_it_is_told_to(tmp_path):
+    path = tmp_path / "r.tlog"
+    path.write_bytes(b"older")
+    with VehicleEndpoint() as endpoint:
+        made = record(endpoint.url, path, seconds=0.5, replace=True)
+    assert len(frames_of(path)) == made.messages > 0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_is_full_or_a_folder_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(OutputError, match="cannot write"):
+        TlogWriter(tmp_path / "gone" / "a.tlog")
+    tlog = TlogWriter(tmp_path / "a.tlog")
+    frame = Frame(bytes(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3).pack(mavlink.MAVLink(None, 1))))
+    tlog.write(frame)
+    whole, tlog._stream = tlog._stream, io.BytesIO()
+    tlog._stream.write = lambda record: len(record) // 2
+    with pytest.raises(OutputError, match="is the disk full"):
+        tlog.write(frame)
+    whole.close()
+    assert tlog.frames == 1

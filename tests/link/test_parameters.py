@@ -23,7 +23,8 @@ INT8, INT32 = 2, 6
     [("ardupilot", "FENCE_TYPE", 4), ("ardupilot", "FENCE_ALT_MAX", 87.5), ("px4", "GF_ACTION", 3),
      ("px4", "RTL_RETURN_ALT", 42.5)],
 )  # fmt: skip
-def test_a_parameter_is_set_over_a_link_that_loses(autopilot, name, after):
+def test_a_parameter_is_set_over_a_link_that_loses(autopilot, name, after, monkeypatch):
+    monkeypatch.setattr("sparsor.link.parameters.ANSWER_S", 0.2)
     with (
         practice(autopilot) as server,
         BadLink(server.udp_port, loss=0.3, twice=0.2) as link,
@@ -86,6 +87,20 @@ def refuse(server, name):
     values.receive = stubborn
 
 
+def refuse_after_one(server, name):
+    """Let the vehicle take one change of a parameter and no other."""
+    receive = server.autopilot.parameters.receive
+
+    def once(message, peer):
+        out = receive(message, peer)
+        if message.get_type() == "PARAM_SET" and message.param_id == name:
+            server.autopilot.parameters.receive = receive
+            refuse(server, name)
+        return out
+
+    server.autopilot.parameters.receive = once
+
+
 @pytest.mark.parametrize(
     ("autopilot", "stubborn", "held"),
     [("ardupilot", "FENCE_ENABLE", {"FENCE_TYPE": 7, "FENCE_ENABLE": 0}), ("px4", "GF_ACTION", {"GF_ACTION": 0})],
@@ -103,6 +118,27 @@ def test_a_fence_that_cannot_be_enforced_leaves_what_was_set(autopilot, stubborn
         assert failed.value.vehicle_state == "new plan"
         assert {name: values[name] for name in held} == held
         assert server.autopilot.store.items[0]
+
+
+def test_a_fence_that_can_neither_be_enforced_nor_set_back(monkeypatch):
+    monkeypatch.setattr("sparsor.link.parameters.ANSWER_S", 0.05)
+    with practice() as server, Connection(url_of(server)) as connection:
+        refuse(server, "FENCE_ENABLE")
+        asked = order_fence(connection, find_vehicle(connection, 1), short_plan())
+        refuse_after_one(server, "FENCE_TYPE")
+        words = "could not be set again either: see to it that it has FENCE_TYPE 7 and FENCE_ENABLE 0"
+        with pytest.raises(LinkFailureError, match=words):
+            enforce_fence(connection, find_vehicle(connection, 1), asked)
+
+
+def test_a_vehicle_that_does_not_tell_of_its_fence_is_not_changed(monkeypatch):
+    monkeypatch.setattr("sparsor.link.parameters.ANSWER_S", 0.05)
+    with practice() as server, Connection(url_of(server)) as connection:
+        vehicle = find_vehicle(connection, 1)
+        server.autopilot.parameters.receive = lambda *_: []
+        assert fence_enforced(connection, vehicle) is None
+        with pytest.raises(LinkFailureError, match="does not tell FENCE_TYPE"):
+            order_fence(connection, vehicle, short_plan())
 
 
 def test_a_ctrl_c_while_the_fence_is_enforced_leaves_what_was_set(monkeypatch):

@@ -16,6 +16,7 @@ from sparsor.geodesy import BoundingBox, Grid
 from sparsor.mission.sidecar import Sidecar, read_sidecar, sidecar_npz
 from sparsor.prior.model import Model
 from sparsor.prior.statistics import Kernel
+from sparsor.vehicle import load_sensor
 from strategies import grids
 
 ARRAYS = ("dictionary", "mean", "covariance_factor", "validation")
@@ -45,6 +46,7 @@ def make(grid=None, seed=0, **changes):
         "stops": rng.permutation(np.flatnonzero(phi.any(axis=0))), "altitude_m": 61.25, "hold_s": 2.5,
         "home": (51.5012345678, 25.2712345678, -3.0625), "home_altitude_known": True, "lasso_weight": 3e-4,
         "expected": {"relative_error": 1 / 3}, "plans": {"m.plan": "0" * 64},
+        "sensor": load_sensor().model_copy(update={"t90_s": 12.5, "range": (0.0, 500.0)}) if seed % 2 else None,
     }  # fmt: skip
     return Sidecar(**{**known, **changes})
 
@@ -66,7 +68,17 @@ def test_what_was_written_is_read(tmp_path, grid, seed):
         written, read = getattr(sidecar, name), getattr(again, name)
         assert read.dtype == written.dtype
         assert np.array_equal(read, written)
-    for name in ("name", "altitude_m", "hold_s", "home", "home_altitude_known", "lasso_weight", "expected", "plans"):
+    for name in (
+        "name",
+        "altitude_m",
+        "hold_s",
+        "home",
+        "home_altitude_known",
+        "lasso_weight",
+        "expected",
+        "plans",
+        "sensor",
+    ):
         assert getattr(again, name) == getattr(sidecar, name)
     for name in ("shape", "kernel", "lasso_weight", "scale", "unit", "window_m", "provenance"):
         assert getattr(again.model, name) == getattr(sidecar.model, name)
@@ -107,6 +119,7 @@ def about(content, **changes):
         (lambda good: altered(good, sidecar=None), "not a sidecar"),
         (lambda good: altered(good, phi=None), "not a sidecar"),
         (lambda good: altered(good, model=None), "not a sparsor model"),
+        (lambda good: about(good, sensor={"name": "x", "t90_s": -1}), "sensor that cannot be used"),
         (lambda good: altered(good, phi=np.ones((3, 4), bool)), "do not fit a grid of 6 x 5"),
         (lambda good: altered(good, stops=np.array([0, 30])), "do not fit a grid of 6 x 5"),
         (lambda good: altered(good, stops=np.array([-1, 3])), "do not fit a grid of 6 x 5"),

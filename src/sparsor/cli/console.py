@@ -28,7 +28,14 @@ Json = Annotated[
     bool,
     typer.Option("--json", help="Print one JSON object, SI units in the key names.", rich_help_panel=TELLING),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the result's path only.", rich_help_panel=TELLING)]
+
+
+def quiet_option(prints: str) -> Any:  # noqa: ANN401 # what typer.Option returns
+    """Return the option -q of a command, which says what is still printed."""
+    return typer.Option("--quiet", "-q", help=prints, rich_help_panel=TELLING)
+
+
+Quiet = Annotated[bool, quiet_option("Print the result's path only.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show tracebacks and details.", rich_help_panel=TELLING)]
 
 
@@ -49,13 +56,25 @@ class Talk(IntEnum):
 
 def reporting(command: Callable[P, R]) -> Callable[P, R]:
     """Turn what a command raises into a sentence on stderr and an exit code; no traceback without -v."""
+    return reporting_as("interrupted: what was there before is still there")(command)
 
+
+def reporting_as(interrupted: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Do as `reporting` for a command that has its own sentence for a Ctrl-C."""
+
+    def guard(command: Callable[P, R]) -> Callable[P, R]:
+        return _guarded(command, interrupted)
+
+    return guard
+
+
+def _guarded(command: Callable[P, R], interrupted: str) -> Callable[P, R]:
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return command(*args, **kwargs)
         except KeyboardInterrupt:
-            typer.echo("interrupted: what was there before is still there", err=True)
+            typer.echo(interrupted, err=True)
             raise typer.Exit(INTERRUPTED) from None
         except (SparsorError, OSError, MemoryError) as error:
             if kwargs.get("verbose"):
@@ -64,6 +83,35 @@ def reporting(command: Callable[P, R]) -> Callable[P, R]:
             raise typer.Exit(getattr(error, "exit_code", 1)) from None
 
     return guarded
+
+
+@contextmanager
+def ended_by_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Let the first Ctrl-C or request to terminate call `stop`; those that follow change nothing.
+
+    Also where a shell started the program in the background, with Ctrl-C ignored.
+    """
+    import signal
+
+    asked = False
+
+    def end(*_: object) -> None:
+        nonlocal asked
+        if not asked:
+            asked = True
+            stop()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def interrupt() -> None:
+    """Do as a Ctrl-C does."""
+    raise KeyboardInterrupt
 
 
 @contextmanager

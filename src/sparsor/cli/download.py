@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, print_table, progress_bar, reporting, warn
+from sparsor.cli.console import (
+    Json,
+    Talk,
+    Verbose,
+    print_json,
+    print_table,
+    progress_bar,
+    quiet_option,
+    reporting,
+    warn,
+)
 from sparsor.cli.upload import CONNECT_HELP
 from sparsor.errors import InputError
 
@@ -18,9 +29,14 @@ WHICH = "Which logs"
 def download(
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FILE|DIR", help="Where to; in a folder it gets the vehicle's name."),
-    ] = Path(),
+        str,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE|DIR/",
+            help="Where to; in a folder it gets the vehicle's name (DIR/ is made when it is missing).",
+        ),
+    ] = ".",
     log: Annotated[
         int | None,
         typer.Option(
@@ -38,7 +54,7 @@ def download(
     ] = 30.0,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print the paths only; with --list the numbers.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Fetch the log that the vehicle wrote itself: ArduPilot's .BIN, PX4's .ulg. Lost parts are asked for again.
@@ -64,9 +80,10 @@ def download(
     with progress_bar(Talk.of(quiet=quiet, verbose=verbose)) as progress:
         made = fetch(
             connect,
-            output,
+            Path(output),
             number=log,
             every=every,
+            into_folder=output.endswith(("/", os.sep)),
             system_id=system,
             timeout_s=timeout,
             replace=force,

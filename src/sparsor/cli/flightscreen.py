@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
-from sparsor.cli.console import Talk, progress_bar
+from sparsor.cli.console import Talk, progress_bar, warn
 from sparsor.errors import InputError
 
 if TYPE_CHECKING:
     from sparsor.journeys.flying import Choice
+    from sparsor.link.flights.briefing import Briefing
+    from sparsor.link.flights.samples import SampleCounter
     from sparsor.link.flights.views import Event, View
     from sparsor.link.missions.upload import UploadReport
     from sparsor.link.vehicles import FoundVehicle
+
+OLD_SAMPLE_S = 3.0
 
 
 class FlightScreen:
@@ -55,14 +59,13 @@ class FlightScreen:
         """Say which vehicle was found."""
         self._say(f"found {vehicle.words}")
 
-    def confirm(self, report: UploadReport | None = None) -> bool:
-        """Ask whether to arm and start."""
+    def confirm(self, report: UploadReport, briefing: Briefing, samples: SampleCounter) -> bool:
+        """Say what has to be known, to those who asked for quiet the warnings, and ask whether to arm and start."""
         self._bars.close()
-        if report is not None:
-            for warning in report.warnings:
-                self._say(f"warning: {warning}")
-            self._say(f"the vehicle holds the plan: {report.items} items, read back and the same")
-            self._say(f"its fence: {fence_words(report)}")
+        self._say(f"the vehicle holds the plan: {report.items} items, read back and the same")
+        for line in briefing_lines(report, briefing, samples):
+            self._say(line)
+        warn([*report.warnings, *briefing.warnings])
         return self._yes or bool(_ask(lambda: typer.confirm("arm and start?", err=True)))
 
     def told(self, event: Event) -> None:
@@ -122,6 +125,26 @@ def fence_words(report: UploadReport) -> str:
     return f"{report.fence_points} points, {enforced}"
 
 
+def briefing_lines(report: UploadReport, briefing: Briefing, samples: SampleCounter) -> list[str]:
+    """Return what somebody should know who is asked whether to arm."""
+    places = [("home", briefing.home_m), ("the first waypoint", briefing.first_m)]
+    away = [f"{_length(metres)} to {what}" for what, metres in places if metres is not None]
+    battery = "not known" if briefing.battery_percent is None else f"{briefing.battery_percent} %"
+    heard = ", ".join(f"{count} {name}" for name, count in sorted(samples.counts.items()))
+    return [
+        f"from the vehicle: {', '.join(away) or 'not known, it does not say where it is'}",
+        f"the flight: {briefing.length_m / 1000:.2f} km, about {briefing.seconds / 60:.0f} min, up to "
+        f"{briefing.height_m:g} m above home",
+        f"battery: {battery}",
+        f"its fence: {fence_words(report)}",
+        f"sensor: {f'heard ({heard})' if heard else 'not heard yet'}",
+    ]
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.0f} m" if metres < 1000 else f"{metres / 1000:.1f} km"
+
+
 def flight_line(view: View) -> str:
     """Return a flight in one line; what is not known is left out."""
     parts = [f"item {view.item} of {view.items}", f"{view.flown_m / 1000:.2f} km flown"]
@@ -135,8 +158,8 @@ def flight_line(view: View) -> str:
         parts.append("no samples")
     else:
         rate = "" if view.sample_rate_hz is None else f", {view.sample_rate_hz:.1f}/s"
-        age = "" if view.sample_age_s is None else f", {view.sample_age_s:.0f} s ago"
-        parts.append(f"{view.sample} ({view.samples} samples{rate}{age})")
+        old = view.sample_age_s is not None and view.sample_age_s >= OLD_SAMPLE_S
+        parts.append(f"{view.sample} ({view.samples}{rate}{f', {view.sample_age_s:.0f} s ago' if old else ''})")
     if view.left_s is not None:
         parts.append(f"{view.left_s / 60:.0f} min left")
     return " | ".join(parts)

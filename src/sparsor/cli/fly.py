@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, print_table, reporting
+from sparsor.cli.console import Json, Talk, Verbose, print_json, print_table, quiet_option, reporting_as
 from sparsor.cli.flightscreen import FlightScreen, fence_words
 from sparsor.cli.upload import CONNECT_HELP, EnableFence, Sortie, System, Timeout, Yes, telling_the_state
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sparsor.journeys.flying import FlightReport
 
 
-@reporting
+@reporting_as("interrupted: nothing was sent, the vehicle is as it was")
 def fly(
     plan: Annotated[Path, typer.Argument(metavar="DIR|FILE.plan", help="A mission folder or any .plan.")],
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
@@ -30,7 +30,11 @@ def fly(
     enable_fence: EnableFence = False,
     yes: Yes = False,
     force: Annotated[
-        bool, typer.Option("--force", help="Fly an armed vehicle too; replace a recording that is there.")
+        bool,
+        typer.Option(
+            "--force",
+            help="Fly an armed vehicle too, one far away or with an empty battery; replace a recording that is there.",
+        ),
     ] = False,
     timeout: Timeout = 10.0,
     ready_timeout: Annotated[
@@ -42,7 +46,7 @@ def fly(
         typer.Option("--lost-timeout", metavar="S", min=1, help="How long to wait for a vehicle that fell silent."),
     ] = 60.0,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print only the recording's path.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Upload a plan, arm, start, watch and record everything until the vehicle has landed.
@@ -61,9 +65,21 @@ def fly(
         typer.echo(str(report.tlog))
     else:
         print_table(_rows(report), title="Flown")
+        typer.echo("\n".join(_next_steps(connect, report)))
     if report.result.outcome != "complete":
         typer.echo(f"error: {report.result.outcome}: {_missed(report) or 'every waypoint was reached'}", err=True)
         raise typer.Exit(1)
+
+
+def _next_steps(url: str, report: FlightReport) -> list[str]:
+    """Return what is usually typed next."""
+    folder = report.plan.parent
+    of_ours = any(folder.glob("*.npz"))
+    mission = f"--mission {folder}" if of_ours else f"--plan {report.plan} --bbox W S E N"
+    return [
+        f"the map: reconstruct-map {report.tlog} {mission}",
+        f"the vehicle's own log: sparsor download --connect {url} -o {folder}/",
+    ]
 
 
 def _contents(report: FlightReport) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""`sparsor inspect`: what a plan, model, sidecar or specification holds, in words."""
+"""`sparsor inspect`: what a plan, model, sidecar, specification or flight log holds, in words."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from typing import Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Verbose, print_json, reporting
+from sparsor.cli.console import Json, Verbose, print_json, quiet_option, reporting_as
 
 
-@reporting
+@reporting_as("interrupted")
 def inspect(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A .plan, a model or sidecar (.npz), or a mission.toml.")
+        Path,
+        typer.Argument(
+            metavar="FILE|DIR",
+            help="A .plan or its folder, a model or sidecar (.npz), a mission.toml, or a flight log (.tlog, .BIN, "
+            ".ulg, .csv).",
+        ),
     ],
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print only what kind of file it is.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Say in words what a file holds.

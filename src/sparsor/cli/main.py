@@ -12,6 +12,7 @@ from sparsor.cli.fly import fly
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
 from sparsor.cli.plan import plan
+from sparsor.cli.reconstruct import reconstruct
 from sparsor.cli.record import record
 from sparsor.cli.send import send
 from sparsor.cli.simulate import simulate
@@ -34,6 +35,7 @@ def _program(name: str, *, no_args_is_help: bool = False) -> typer.Typer:
 
 app = _program("sparsor", no_args_is_help=True)
 app.command("plan")(plan)
+app.command("reconstruct")(reconstruct)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
 app.command("upload")(upload)
@@ -80,3 +82,8 @@ def generate_mission() -> None:
 def upload_mission() -> None:
     """Run `upload-mission`, which is `sparsor upload`."""
     _alone("upload-mission", upload)()
+
+
+def reconstruct_map() -> None:
+    """Run `reconstruct-map`, which is `sparsor reconstruct`."""
+    _alone("reconstruct-map", reconstruct)()

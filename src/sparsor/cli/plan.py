@@ -10,12 +10,12 @@ import typer
 
 from sparsor.cli.console import (
     Json,
-    Quiet,
     Talk,
     Verbose,
     print_json,
     print_table,
     progress_bar,
+    quiet_option,
     reporting,
     warn,
 )
@@ -24,7 +24,8 @@ from sparsor.cli.summary import mission_rows, mission_values
 if TYPE_CHECKING:
     from sparsor.mission.specification import MissionSpecification
 
-WHERE, PRIOR, SEARCH, FLIGHT, OUTPUT = "Where", "What maps look like", "Search", "Flight", "Output"
+WHERE, PRIOR, SEARCH, FLIGHT = "Where", "What maps look like", "Search", "Flight"
+SENSOR, OUTPUT = "Sensor", "Output"
 Box = tuple[float, float, float, float]
 
 
@@ -180,8 +181,21 @@ def plan(
         float | None,
         _option(FLIGHT, "Height of home above mean sea level, m.", "--home-altitude", metavar="M"),
     ] = None,
+    sensor_profile: Annotated[
+        str | None,
+        _option(
+            SENSOR,
+            "no2, or a profile of your own (.toml): told to reconstruct-map.",
+            "--sensor-profile",
+            metavar="NAME|FILE.toml",
+        ),
+    ] = None,
+    t90: Annotated[
+        float | None,
+        _option(SENSOR, "Instead: the packaged sensor with this time to 90 % of a step, s.", "--t90", metavar="S"),
+    ] = None,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print only the plan's path, and what speaks against flying it.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Plan the flight whose samples rebuild the whole map, and write it as a QGroundControl plan.
@@ -226,6 +240,7 @@ def plan(
             "home": home,
             "home_altitude_m": home_altitude,
         },
+        "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},
     }
     spec, folder = _request(given, mission_file, output)
@@ -283,7 +298,7 @@ def _request(
 def _as_typed(message: str) -> str:
     """Return a message about keys of mission.toml as one about the options that were typed for them."""
     message = message.replace("search.time_s", "--time").replace("prior.time", "--field-time")
-    message = re.sub(r"\b(?:search|flight|prior|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
+    message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)
 

@@ -8,11 +8,21 @@ from typing import Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, progress_bar, reporting
+from sparsor.cli.console import (
+    Json,
+    Quiet,
+    Talk,
+    Verbose,
+    ended_by_signals,
+    interrupt,
+    print_json,
+    progress_bar,
+    reporting_as,
+)
 from sparsor.cli.upload import CONNECT_HELP
 
 
-@reporting
+@reporting_as("interrupted: whatever had come is recorded")
 def record(
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.tlog", help="Where to.")],
@@ -30,14 +40,14 @@ def record(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Record everything that passes on a link, both directions, to a .tlog.
+    """Record everything that passes on a link, both directions, to a .tlog. Ctrl-C or a request to terminate ends it.
 
     sparsor record --connect udpin://0.0.0.0:14550 -o flight.tlog
     """
     from sparsor.link.recorder import record as record_link
 
     talk = Talk.of(quiet=quiet, verbose=verbose)
-    with progress_bar(talk) as progress:
+    with progress_bar(talk) as progress, ended_by_signals(interrupt):
         made = record_link(
             connect,
             output,

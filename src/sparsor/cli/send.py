@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, reporting
+from sparsor.cli.console import (
+    Json,
+    Talk,
+    Verbose,
+    ended_by_signals,
+    interrupt,
+    print_json,
+    quiet_option,
+    reporting_as,
+)
 from sparsor.cli.upload import CONNECT_HELP
 from sparsor.errors import InputError
 
@@ -22,7 +31,7 @@ FORMAT = "What a line says"
 LINK = "How it is sent"
 
 
-@reporting
+@reporting_as("interrupted")
 def send(
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
     stdin: Annotated[str | None, typer.Argument(metavar="[-]", help="Read standard input.")] = None,
@@ -45,7 +54,8 @@ def send(
         list[str] | None,
         typer.Option(
             metavar="[NAME=]COLUMN",
-            help="A column by its number from 1, or its name in the first line. For each value. Default: 1.",
+            help="A column by its number from 1, or its name in the first line. For each value. Default: 1, where the "
+            "first line does not name several.",
             rich_help_panel=FORMAT,
         ),
     ] = None,
@@ -93,7 +103,7 @@ def send(
         typer.Option(metavar="S", min=0.1, help="How long a file waits for the vehicle.", rich_help_panel=LINK),
     ] = 10.0,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print only how many values were sent.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Send a sensor's values into the telemetry as NAMED_VALUE_FLOAT, until its lines end or Ctrl-C.
@@ -115,10 +125,12 @@ def send(
 
     if (stdin is not None) + (serial is not None) + (csv is not None) != 1:
         raise InputError("say where the values come from: --serial DEVICE, --csv FILE, or - for standard input")
-    form = _form(pattern, value, time, delimiter, name, time_unit)
+    columns = ["1"] if serial is not None and not value else value  # a sensor's first line may be a greeting
+    form = _form(pattern, columns, time, delimiter, name, time_unit)
     source = _source(stdin, serial, csv, form, replay_speed, rate, say)
     spacing_is_rate = csv is not None and not form.has_time
-    with Outlet(connect, system_id=system, component_id=component, say=say) as outlet:
+    opened = Outlet(connect, system_id=system, component_id=component, say=say)
+    with ended_by_signals(interrupt), opened as outlet:
         sent = send_samples(source, outlet, rate_hz=None if spacing_is_rate else rate, timeout_s=timeout, say=say)
     _report(sent, outlet, talk, as_json=as_json)
 
@@ -134,7 +146,7 @@ def _form(
     from sparsor.link.sensing import Columns, Pattern
 
     if pattern is None:
-        return Columns(values or ["1"], name=name, time=time, delimiter=delimiter or "comma", time_unit=time_unit)
+        return Columns(values, name=name, time=time, delimiter=delimiter or "comma", time_unit=time_unit)
     if values or time or delimiter:
         raise InputError("--pattern finds the values by itself; leave out --value, --time and --delimiter")
     return Pattern(pattern, name=name, time_unit=time_unit)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sparsor.cli.console import Quiet, Verbose, reporting, warn
+from sparsor.cli.console import Verbose, ended_by_signals, quiet_option, reporting, warn
 from sparsor.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from sparsor.link.practice import PracticeServer, Window
 
 VEHICLE, LISTENING = "What it is", "Where it listens, and how fast time runs"
@@ -36,7 +33,9 @@ def _option(panel: str, help_text: str, *names: str, metavar: str | None = None)
 def simulate(
     mission: Annotated[
         Path | None,
-        _option(VEHICLE, "Rehearse this mission: its home, autopilot, vehicle and box.", "--mission", metavar="DIR"),
+        _option(
+            VEHICLE, "Rehearse this mission: its home, autopilot, vehicle, sensor and box.", "--mission", metavar="DIR"
+        ),
     ] = None,
     home: Annotated[
         tuple[float, float] | None,
@@ -70,8 +69,8 @@ def simulate(
         list[str] | None,
         _option(
             LISTENING,
-            "udp:PORT, tcp:PORT or udp:HOST:PORT; one of each (default: udp:14550 and tcp:5760, with --send-to the "
-            "latter).",
+            "udp:PORT, tcp:PORT, udp:HOST:PORT or udpin://HOST:PORT; one of each (default: udp:14550 and tcp:5760, "
+            "with --send-to the latter).",
             "--listen",
             metavar="ADDRESS",
         ),
@@ -93,8 +92,14 @@ def simulate(
         tuple[float, float],
         _option(SENSOR, "Reading at the field's lowest and highest value, ppb.", "--sensor-range", metavar="LO HI"),
     ] = (10.0, 70.0),
-    t90: Annotated[float, _option(SENSOR, "Time to 90 % of a step, s.", "--t90", metavar="S")] = 30.0,
-    noise: Annotated[float, _option(SENSOR, "Of each sample, ppb.", "--noise", metavar="PPB")] = 1.0,
+    t90: Annotated[
+        float | None,
+        _option(SENSOR, "Time to 90 % of a step, s (default: the mission's sensor's, else 30).", "--t90", metavar="S"),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        _option(SENSOR, "Of each sample, ppb (default: the mission's sensor's, else 1).", "--noise", metavar="PPB"),
+    ] = None,
     drift: Annotated[float, _option(SENSOR, "After an hour, ppb.", "--drift", metavar="PPB")] = 0.0,
     drop_outs: Annotated[float, _option(SENSOR, "Share of samples lost, 0..1.", "--drop-outs", metavar="SHARE")] = 0.0,
     field: Annotated[
@@ -137,6 +142,7 @@ def simulate(
         Path | None,
         _option(FIELD, "Write the field it flies through, in ppb, to this NetCDF file.", "--truth", metavar="FILE.nc"),
     ] = None,
+    force: Annotated[bool, _option(FIELD, "Replace that file when it is there.", "--force")] = False,
     wind: Annotated[
         tuple[float, float],
         _option(WIND, "Speed, m/s, and where it comes from, degrees (90: east).", "--wind", metavar="SPEED FROM_DEG"),
@@ -166,7 +172,10 @@ def simulate(
         float | None,
         _option(TROUBLES, "When the battery falls to what makes it return.", "--low-battery", metavar="S"),
     ] = None,
-    quiet: Quiet = False,
+    keep_battery: Annotated[
+        bool, _option(TROUBLES, "Nobody changes the battery between flights.", "--keep-battery")
+    ] = False,
+    quiet: Annotated[bool, quiet_option("Print warnings and errors only.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Stand in for a vehicle, so that a mission can be rehearsed; not flight dynamics. Ctrl-C ends it.
@@ -184,6 +193,8 @@ def simulate(
         WindSettings,
     )
 
+    if truth is not None and truth.exists() and not force:
+        raise InputError(f"'{truth}' is there already; give another name, or --force to replace it")
     addresses = _addresses(listen or list(DEFAULT_LISTEN[1:] if send_to else DEFAULT_LISTEN))
     targets = [_target(text) for text in send_to or ()]
     practice = prepare_practice(
@@ -197,13 +208,13 @@ def simulate(
             sensor=SensorSettings(
                 low_ppb=sensor_range[0],
                 high_ppb=sensor_range[1],
-                t90_s=t90,
-                noise_ppb=noise,
                 drift_ppb_h=drift,
                 drop_out_fraction=drop_outs,
             )
             if sensor
             else None,
+            t90_s=t90,
+            noise_ppb=noise,
             wind=WindSettings(*wind, gusts),
             troubles=Troubles(
                 silent_sensor=_windows("--silent-sensor", silent_sensor),
@@ -211,6 +222,7 @@ def simulate(
                 link_loss=_windows("--link-loss", link_loss),
                 low_battery_s=low_battery,
                 link=LinkTroubles(lose, repeat, delay),
+                keep_battery=keep_battery,
             ),
             seed=seed,
             system=system,
@@ -221,16 +233,23 @@ def simulate(
     if truth is not None:
         write_truth(practice, truth)
     server = PracticeServer(
-        PracticeAutopilot(practice.settings),
+        PracticeAutopilot(practice.settings, (lambda _: None) if quiet else _tell),
         udp=addresses.get("udp"),
         tcp=addresses.get("tcp"),
         send_to=targets,
         speedup=speedup,
     )
-    with _until_interrupted(server):
-        if not quiet:
-            _introduce(server, addresses, targets, truth)
-        server.run()
+    try:
+        with ended_by_signals(server.stop):  # from before it says where it listens
+            if not quiet:
+                _introduce(server, addresses, targets, truth, mission)
+            server.run()
+    finally:
+        server.close()
+
+
+def _tell(line: str) -> None:
+    typer.echo(line, err=True)
 
 
 def _addresses(texts: list[str]) -> dict[str, SocketAddress]:
@@ -265,33 +284,32 @@ def _windows(option: str, texts: list[str] | None) -> tuple[Window, ...]:
 
 
 def _introduce(
-    server: PracticeServer, addresses: dict[str, SocketAddress], targets: list[SocketAddress], truth: Path | None
+    server: PracticeServer,
+    addresses: dict[str, SocketAddress],
+    targets: list[SocketAddress],
+    truth: Path | None,
+    mission: Path | None,
 ) -> None:
     settings = server.autopilot.settings
     place = f"{settings.home.lon_deg:g} {settings.home.lat_deg:g}"
     typer.echo(f"{settings.flavour.title} at {place}, for rehearsals; not flight dynamics")
-    if server.udp_port:
-        typer.echo(f"connect to udpout://{addresses['udp'][0]}:{server.udp_port}")
-    if server.tcp_port:
-        typer.echo(f"connect to tcpout://{addresses['tcp'][0]}:{server.tcp_port}")
+    urls = [
+        f"{kind}out://{_reachable(addresses[kind][0])}:{port}"
+        for kind, port in (("udp", server.udp_port), ("tcp", server.tcp_port))
+        if port
+    ]
+    for url in urls:
+        typer.echo(f"connect to {url}")
     for host, port in targets:
         typer.echo(f"sends to {host}:{port}; connect there to udpin://0.0.0.0:{port}")
     if truth is not None:
         typer.echo(f"the field it flies through is in {truth}")
+    if settings.truth is not None:
+        typer.echo(f"its sensor: t90 {settings.sensor.t90_s:g} s, noise {settings.sensor.noise_ppb:g} ppb")
+    if mission is not None and urls:
+        typer.echo(f"to fly the mission: sparsor fly {mission} --connect {urls[0]}")
 
 
-@contextmanager
-def _until_interrupted(server: PracticeServer) -> Iterator[None]:
-    """Let Ctrl-C and a request to terminate end the server, from before it says where it listens."""
-    import signal
-
-    def stop(*_: object) -> None:
-        server.stop()
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        server.close()
+def _reachable(host: str) -> str:
+    """Return where to connect to what listens at a host: 0.0.0.0 is every address of this computer."""
+    return "127.0.0.1" if host in ("", "0.0.0.0") else host

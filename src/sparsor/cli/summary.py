@@ -74,6 +74,8 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{model.window_m[1] / 1000:.4g} km, {model.atoms} atoms",
         ),
     ]
+    if mission.sensor is not None:
+        table.append(("sensor", mission.sensor.words))
     if details:
         weights = mission.weights
         table += [

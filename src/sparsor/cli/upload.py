@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sparsor.cli.console import Json, Quiet, Talk, Verbose, print_json, print_table, reporting, warn
+from sparsor.cli.console import Json, Talk, Verbose, print_json, print_table, quiet_option, reporting_as, warn
 from sparsor.cli.flightscreen import FlightScreen, fence_words
 from sparsor.errors import SparsorError
 
@@ -31,7 +31,7 @@ Timeout = Annotated[
 ]
 
 
-@reporting
+@reporting_as("interrupted: nothing was sent, the vehicle is as it was")
 def upload(
     plan: Annotated[Path, typer.Argument(metavar="DIR|FILE.plan", help="A mission folder or any .plan.")],
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
@@ -43,10 +43,12 @@ def upload(
     ] = False,
     enable_fence: EnableFence = False,
     yes: Yes = False,
-    force: Annotated[bool, typer.Option("--force", help="Send to an armed vehicle too.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Send to an armed vehicle too; start where it would be refused.")
+    ] = False,
     timeout: Timeout = 10.0,
     as_json: Json = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, quiet_option("Print only what the vehicle holds, and warnings.")] = False,
     verbose: Verbose = False,
 ) -> None:
     """Send a plan to the vehicle, read it back and compare.
@@ -71,7 +73,8 @@ def upload(
             found=screen.found,
             told=screen.told,
         )
-    warn(report.warnings)
+    if not start:  # else they were said before the start
+        warn(report.warnings)
     if as_json:
         print_json(_contents(report))
     elif quiet:
@@ -82,13 +85,18 @@ def upload(
 
 @contextmanager
 def telling_the_state(as_json: bool) -> Iterator[None]:
-    """Print one JSON object with the error and what the vehicle is left with, where a result would have been."""
+    """Print one JSON object with the error and what the vehicle is left with, where a result would have been.
+
+    An error that does not say so, and a Ctrl-C that nobody made one of, came before anything was sent.
+    """
     try:
         yield
-    except SparsorError as error:
+    except (SparsorError, KeyboardInterrupt) as error:
         if as_json:
             state = getattr(error, "vehicle_state", "unchanged")
-            print_json({"error": str(error), "vehicle_state": state})
+            recording = getattr(error, "recording", None)
+            kept = {} if recording is None else {"tlog": recording}
+            print_json({"error": str(error) or "interrupted", "vehicle_state": state, **kept})
         raise
 
 

@@ -80,6 +80,10 @@ class FrameReader:
     is taken when it lies between frames without a gap: right behind a good one, and the next one begins
     right behind it, or nothing does (`flush`).
 
+    This is for live links. The compiled scanner (`mavlink_scan`) is faster on files, but its compiler takes about a
+    second to load and five the first time, during which a link would not be read; here a frame takes some 6
+    microseconds, which is far more frames than any link carries. Constants and checksum are those of this module.
+
     Attributes
     ----------
     skipped : int
@@ -130,18 +134,27 @@ class FrameReader:
         return found
 
 
-def checksum(data: bytes) -> int:
+def checksum(data: bytes, start: int = 0xFFFF) -> int:
     """Return CRC-16/MCRF4XX.
 
     Python's own CRC-CCITT runs over the bits in the other direction, so bytes and result are reversed.
+
+    Parameters
+    ----------
+    data : bytes
+    start : int
+        The checksum of what comes before, 0..65535.
 
     Examples
     --------
     >>> hex(checksum(b"123456789"))
     '0x6f91'
     """
-    mirrored = binascii.crc_hqx(data.translate(_REVERSED), 0xFFFF)
-    return _REVERSED[mirrored & 0xFF] << 8 | _REVERSED[mirrored >> 8]
+    return _mirrored(binascii.crc_hqx(data.translate(_REVERSED), _mirrored(start)))
+
+
+def _mirrored(crc: int) -> int:
+    return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
 
 
 @cache

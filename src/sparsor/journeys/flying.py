@@ -9,11 +9,13 @@ from enum import Enum
 from typing import TYPE_CHECKING, Protocol
 
 from sparsor.errors import InputError, LeftBehindError, StoppedError
-from sparsor.journeys.uploading import choose_plan
+from sparsor.journeys.uploading import choose_plan, profile_of
 from sparsor.link.connection import Connection
-from sparsor.link.flights.flying import Flight, FlightResult
+from sparsor.link.flights.briefing import brief
+from sparsor.link.flights.flying import FLIES_ON, Flight, FlightResult
 from sparsor.link.flights.modes import flight_modes
 from sparsor.link.flights.samples import SampleCounter
+from sparsor.link.flights.views import Event
 from sparsor.link.missions.upload import NEW_PLAN, UploadReport, upload_plan
 from sparsor.link.ports.addresses import parse_address
 from sparsor.link.tlog import TlogWriter
@@ -24,9 +26,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from sparsor.link.flights.views import Event, View
+    from sparsor.link.flights.briefing import Briefing
+    from sparsor.link.flights.views import View
+    from sparsor.link.ports.addresses import Address
     from sparsor.link.vehicles import FoundVehicle
     from sparsor.mission import MissionPlan
+    from sparsor.vehicle import Vehicle
 
 
 class Choice(Enum):
@@ -48,7 +53,7 @@ class Watcher(Protocol):
         """Hear which vehicle was found, before anything is sent."""
         ...
 
-    def confirm(self, report: UploadReport) -> bool:
+    def confirm(self, report: UploadReport, briefing: Briefing, samples: SampleCounter) -> bool:
         """Say whether to arm and start, now that the vehicle holds the plan."""
         ...
 
@@ -76,7 +81,7 @@ class FlightOptions:
     enable_fence : bool
         Make the vehicle keep to the plan's fence.
     force : bool
-        Fly an armed vehicle too, and replace a recording that is there.
+        Fly an armed vehicle too, and what `brief` would refuse; replace a recording that is there.
     timeout_s, ready_timeout_s, lost_timeout_s : float
         How long to wait for the vehicle, for its being ready to fly, and for a vehicle that fell silent in flight.
     """
@@ -96,6 +101,8 @@ class FlightReport:
 
     Parameters
     ----------
+    plan : Path
+        The .plan that was flown.
     upload : UploadReport
     result : FlightResult
     tlog : Path
@@ -105,6 +112,7 @@ class FlightReport:
         Named values in it, by name.
     """
 
+    plan: Path
     upload: UploadReport
     result: FlightResult
     tlog: Path
@@ -139,13 +147,13 @@ def fly_mission(path: Path, url: str, output: Path | None, options: FlightOption
     chosen = choose_plan(path, options.sortie)
     plan, address = read_plan(chosen), parse_address(url)
     samples = SampleCounter()
-    with (
-        _recording(output or default_tlog(chosen), replace=options.force) as tlog,
-        Connection(address, recording=tlog, timeout_s=options.timeout_s) as connection,
-    ):
+    with _recorded(address, output or default_tlog(chosen), options) as (connection, tlog):
         connection.listen(samples)
-        upload, result = _flown(plan, connection, samples, options, watcher)
-    return FlightReport(upload, result, tlog.path, tlog.frames, dict(samples.counts))
+        vehicle, upload = _uploaded(plan, profile_of(chosen), connection, samples, options, watcher)
+        watcher.told(Event(f"recording to {tlog.path}"))
+        with Flight(connection, vehicle, plan, samples, told=watcher.told, seen=watcher.seen) as flight:
+            result = _watched(flight, options, watcher)
+    return FlightReport(chosen, upload, result, tlog.path, tlog.frames, dict(samples.counts))
 
 
 def default_tlog(plan: Path) -> Path:
@@ -154,34 +162,52 @@ def default_tlog(plan: Path) -> Path:
 
 
 @contextmanager
-def _recording(path: Path, *, replace: bool) -> Iterator[TlogWriter]:
-    """Yield a recording; where nothing came of the flight (`InputError`), what was there before is there again."""
-    before = path.with_name(f"{path.name}.before")
-    kept = replace and path.is_file()
-    if kept:
-        path.replace(before)
-    tlog = TlogWriter(path)
+def _recorded(address: Address, path: Path, options: FlightOptions) -> Iterator[tuple[Connection, TlogWriter]]:
+    """Yield a link and its recording; that is discarded where the flight is refused or nobody is heard."""
+    tlog = TlogWriter(path, replace=options.force)
+    worth_keeping = False
     try:
-        yield tlog
-    except InputError:
-        tlog.close()
-        path.unlink()
-        if kept:
-            before.replace(path)
-        raise
+        with Connection(address, recording=tlog, timeout_s=options.timeout_s) as connection:
+            refused = False
+            try:
+                yield connection, tlog
+            except InputError:
+                refused = True
+                raise
+            except LeftBehindError as error:
+                raise _with_recording(error, path, address.url) from error
+            finally:
+                worth_keeping = connection.frames_received > 0 and not refused
     finally:
-        tlog.close()
-    if kept:
-        before.unlink()
+        if worth_keeping:
+            tlog.close()
+        else:
+            tlog.discard()
 
 
-def _flown(
-    plan: MissionPlan, connection: Connection, samples: SampleCounter, options: FlightOptions, watcher: Watcher
-) -> tuple[UploadReport, FlightResult]:
+def _with_recording(error: LeftBehindError, path: Path, url: str) -> LeftBehindError:
+    """Return an error that also says where the recording is, and how to record what the vehicle does from now on."""
+    words = f"{error}. The recording until then: {path}"
+    if error.vehicle_state == FLIES_ON:
+        words += f"; to record on: sparsor record --connect {url} -o {path.with_name(f'{path.stem}-2.tlog')}"
+    return type(error)(words, error.vehicle_state, str(path))
+
+
+def _uploaded(
+    plan: MissionPlan,
+    profile: Vehicle | None,
+    connection: Connection,
+    samples: SampleCounter,
+    options: FlightOptions,
+    watcher: Watcher,
+) -> tuple[FoundVehicle, UploadReport]:
+    """Find the vehicle, send it the plan and have the start confirmed."""
     vehicle = find_vehicle(connection, options.system_id, options.timeout_s)
     samples.system_id = vehicle.system_id
     watcher.found(vehicle)
-    flight_modes(vehicle)  # refuses what cannot be started before anything is sent
+    # What cannot or must not be started is refused before anything is sent.
+    flight_modes(vehicle)
+    briefing = brief(plan, connection, vehicle, profile=profile, force=options.force)
     upload = upload_plan(
         plan,
         connection,
@@ -190,14 +216,13 @@ def _flown(
         enable_fence=options.enable_fence,
         progress=watcher.progress,
     )
-    _confirm(watcher, upload)
-    with Flight(connection, vehicle, plan, samples, told=watcher.told, seen=watcher.seen) as flight:
-        return upload, _watched(flight, options, watcher)
+    _confirm(watcher, upload, briefing, samples)
+    return vehicle, upload
 
 
-def _confirm(watcher: Watcher, upload: UploadReport) -> None:
+def _confirm(watcher: Watcher, upload: UploadReport, briefing: Briefing, samples: SampleCounter) -> None:
     try:
-        if watcher.confirm(upload):
+        if watcher.confirm(upload, briefing, samples):
             return
     except KeyboardInterrupt:
         raise StoppedError("interrupted before the start. The vehicle: it holds the new plan", NEW_PLAN) from None
@@ -218,7 +243,4 @@ def _watched(flight: Flight, options: FlightOptions, watcher: Watcher) -> Flight
         except KeyboardInterrupt:
             todo = watcher.interrupted()
         if todo is Choice.LEAVE:
-            raise StoppedError(
-                "stopped watching. The vehicle flies on by itself; record it with 'sparsor record'",
-                "flies on by itself",
-            )
+            raise StoppedError("stopped watching. The vehicle: flies on by itself", FLIES_ON)

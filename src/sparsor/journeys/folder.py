@@ -121,4 +121,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
             "incoherence": candidate.incoherence,
         },
         plans=hashes,
+        sensor=mission.sensor,
     )

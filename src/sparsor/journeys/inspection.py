@@ -6,13 +6,17 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from sparsor.errors import MissionError
+from sparsor.journeys.flown import is_edited, plan_changes
+from sparsor.journeys.loginspection import inspect_log
 from sparsor.mission import describe_plan, read_plan
-from sparsor.mission.sidecar import Sidecar, content_hash, read_sidecar
+from sparsor.mission.sidecar import Sidecar, read_sidecar
 from sparsor.mission.specification import read_specification
 from sparsor.prior.model import Model, model_from_arrays, read_npz
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+LOGS = frozenset({".tlog", ".bin", ".ulg", ".csv"})
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,7 @@ class Inspection:
 
     Parameters
     ----------
-    kind : {"plan", "model", "sidecar", "specification"}
+    kind : {"plan", "model", "sidecar", "specification", "log"}
     contents : dict
         Plain values for JSON, SI units in the names.
     lines : tuple of str
@@ -57,29 +61,38 @@ def inspect_file(path: Path) -> Inspection:
         return _model(model_from_arrays(arrays, f"'{path}'"), path)
     if path.suffix == ".toml":
         return _specification(path)
-    raise MissionError(f"'{path}' is of an unknown kind; known are .plan, .npz (model or sidecar) and .toml")
+    if LOGS.intersection(suffix.lower() for suffix in path.suffixes):
+        return Inspection("log", *inspect_log(path))
+    raise MissionError(
+        f"'{path}' is of an unknown kind; known are .plan, .npz (model or sidecar), .toml and flight logs (.tlog, "
+        ".BIN, .ulg, .csv)"
+    )
 
 
 def _plan(path: Path) -> Inspection:
-    description = describe_plan(read_plan(path))
-    edited = _edited(path)
+    plan = read_plan(path)
+    description = describe_plan(plan)
+    sidecar = _sidecar_of(path)
+    edited = None if sidecar is None else is_edited(path, sidecar)
+    changes = plan_changes(plan, sidecar) if edited and sidecar is not None else ()
     lines = [f"{path}: a QGroundControl plan", *description.lines]
     if edited is not None:
         lines.append(
             "Edited since sparsor wrote it." if edited else "Unchanged since sparsor wrote it (by its sidecar)."
         )
-    return Inspection("plan", {**asdict(description), "edited": edited}, tuple(lines))
+    lines += [f"Changed: {change}" for change in changes]
+    return Inspection("plan", {**asdict(description), "edited": edited, "changes": list(changes)}, tuple(lines))
 
 
-def _edited(path: Path) -> bool | None:
-    """Return whether a plan differs from what its sidecar remembers; None without a sidecar."""
-    for candidate in sorted(path.parent.glob("*.npz")):
+def _sidecar_of(plan: Path) -> Sidecar | None:
+    """Return the sidecar beside a plan that remembers it."""
+    for candidate in sorted(plan.parent.glob("*.npz")):
         try:
-            remembered = read_sidecar(candidate).plans.get(path.name)
+            sidecar = read_sidecar(candidate)
         except MissionError:
             continue
-        if remembered is not None:
-            return content_hash(path.read_bytes()) != remembered
+        if plan.name in sidecar.plans:
+            return sidecar
     return None
 
 
@@ -126,6 +139,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
         f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast "
         "(|s - s'| / |s - mean(s)|, from the sums).",
+        *(() if sidecar.sensor is None else (f"Sensor: {sidecar.sensor.words}.",)),
         *_model_lines(sidecar.model),
     )
     contents = {
@@ -138,6 +152,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         "home_altitude_known": sidecar.home_altitude_known,
         "expected": dict(sidecar.expected),
         "plans": dict(sidecar.plans),
+        "sensor": None if sidecar.sensor is None else sidecar.sensor.model_dump(mode="json"),
         "model": _model_contents(sidecar.model),
     }
     return Inspection("sidecar", contents, lines)

@@ -167,7 +167,7 @@ def _from_file(request: PriorSection, box: BoundingBox, *, paper: bool) -> Prior
             f"{'a centred' if model.centred else 'an uncentred'} one of {model.atoms}: learn it with "
             f"'sparsor learn --uncentred --atoms {cells}', or leave --model out"
         )
-    widening, said = _size_difference(model, box)
+    widening, said = size_difference(model, box)
     return PriorChoice(model, None, False, widening, said)
 
 
@@ -184,7 +184,7 @@ def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) 
             f"The built-in field is the Gulf's, the box lies at {box.centre_lon_deg:.4g} E, {box.centre_lat_deg:.4g} N "
             "(are longitude and latitude swapped? The order is west south east north)."
         )
-    widening, said = _size_difference(model, box, said_from=_BETWEEN_SIDES)
+    widening, said = size_difference(model, box, said_from=_BETWEEN_SIDES)
     return PriorChoice(model, None, True, widening, (*warnings, *said))
 
 
@@ -215,7 +215,7 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
 
     model = _cached(key, learn)
     model = with_sources(model, {request.field: field})
-    widening, said = _size_difference(model, box)
+    widening, said = size_difference(model, box)
     notes = [*field.notes, *said]
     if not np.isfinite(sample_at(field, box.centre_lon_deg, box.centre_lat_deg)):
         notes.append(
@@ -229,7 +229,7 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
     return PriorChoice(model, field, False, widening, tuple(notes))
 
 
-def _size_difference(model: Model, box: BoundingBox, *, said_from: float = _SAME_SIZE) -> tuple[float, tuple[str, ...]]:
+def size_difference(model: Model, box: BoundingBox, *, said_from: float = _SAME_SIZE) -> tuple[float, tuple[str, ...]]:
     """Return the factor on the expected error, and the sentence for windows `said_from` times off or more."""
     east_m, north_m = model.window_m
     ratio = max(east_m / box.east_m, box.east_m / east_m, north_m / box.north_m, box.north_m / north_m)

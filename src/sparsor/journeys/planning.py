@@ -22,9 +22,11 @@ from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.mission import Home, MissionPlan, build_mission
 from sparsor.vehicle import (
     Autopilot,
+    SensorProfile,
     Vehicle,
     autopilot_named,
     flight_seconds,
+    load_sensor,
     load_vehicle,
     stop_seconds,
     usable_seconds,
@@ -58,6 +60,8 @@ class PlannedMission:
     place : Place
     prior : PriorChoice
     vehicle : Vehicle
+    sensor : SensorProfile or None
+        None when nothing was said of it.
     candidate : Candidate
         The winner of the search.
     weights : Weights
@@ -80,6 +84,7 @@ class PlannedMission:
     place: Place
     prior: PriorChoice
     vehicle: Vehicle
+    sensor: SensorProfile | None
     candidate: Candidate
     weights: Weights
     plan: MissionPlan
@@ -125,6 +130,7 @@ def plan_mission(
         When something asked for is wrong, or no route meets the budget.
     """
     vehicle, autopilot = load_vehicle(spec.flight.vehicle), autopilot_named(spec.flight.autopilot)
+    sensor = _sensor(spec)
     box, area = _where(spec)
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, progress=progress)
     place = _place(Grid(box, prior.model.shape), area)
@@ -142,7 +148,15 @@ def plan_mission(
         workers=workers or os.cpu_count() or 1,
         progress=progress,
     )
-    return _assemble(spec, place, prior, vehicle, autopilot, problem, weights, candidate)
+    return _assemble(spec, place, prior, vehicle, sensor, autopilot, problem, weights, candidate)
+
+
+def _sensor(spec: MissionSpecification) -> SensorProfile | None:
+    if spec.sensor is None:
+        return None
+    if spec.sensor.profile is not None:
+        return load_sensor(spec.sensor.profile)
+    return load_sensor().model_copy(update={"t90_s": spec.sensor.t90_s})
 
 
 def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
@@ -236,6 +250,7 @@ def _assemble(
     place: Place,
     prior: PriorChoice,
     vehicle: Vehicle,
+    sensor: SensorProfile | None,
     autopilot: Autopilot,
     problem: Problem,
     weights: Weights,
@@ -272,6 +287,7 @@ def _assemble(
         place=place,
         prior=prior,
         vehicle=vehicle,
+        sensor=sensor,
         candidate=candidate,
         weights=weights,
         plan=plan,

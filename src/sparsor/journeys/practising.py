@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from sparsor.core.files import write_file
@@ -22,6 +22,7 @@ from sparsor.link.practice import (
     flavour_named,
     truth_netcdf,
 )
+from sparsor.link.practice.motion import AIRSPEED_PER_CRUISE
 from sparsor.link.practice.place import FlatMap
 from sparsor.mission import Home
 from sparsor.mission.sidecar import Sidecar, read_sidecar
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from sparsor.mission.specification import MissionSpecification
+    from sparsor.vehicle import SensorProfile, Vehicle
 
 Box = tuple[float, float, float, float]
 NEAR_M = 1500.0
@@ -82,7 +84,7 @@ class PracticeRequest:
     Parameters
     ----------
     mission : Path, optional
-        Folder of the mission to rehearse.
+        Folder of the mission to rehearse, or its .plan.
     home : tuple of float, optional
         Longitude and latitude; needed without a mission.
     home_altitude_m : float, optional
@@ -91,6 +93,8 @@ class PracticeRequest:
     through : FieldRequest
     sensor : SensorSettings or None
         None flies no sensor.
+    t90_s, noise_ppb : float, optional
+        Of the sensor; None: of the sensor that the mission was planned for, else as `sensor` has them.
     wind : WindSettings
     troubles : Troubles
     seed, system : int
@@ -105,6 +109,8 @@ class PracticeRequest:
     vehicle: str | None = None
     through: FieldRequest = FieldRequest()
     sensor: SensorSettings | None = field(default_factory=SensorSettings)
+    t90_s: float | None = None
+    noise_ppb: float | None = None
     wind: WindSettings = field(default_factory=WindSettings)
     troubles: Troubles = field(default_factory=Troubles)
     seed: int = 0
@@ -142,11 +148,12 @@ def prepare_practice(request: PracticeRequest) -> Practice:
     home = _home(request, mission)
     flight = mission[0].flight if mission else None
     truth, notes = _truth(request, home, mission[1].grid.box if mission else None)
+    flown = load_vehicle(request.vehicle or (flight.vehicle if flight else "quad"))
     settings = PracticeSettings(
         home=home,
         flavour=flavour_named(request.autopilot or (flight.autopilot if flight else "ardupilot")),
-        vehicle=load_vehicle(request.vehicle or (flight.vehicle if flight else "quad")),
-        sensor=request.sensor or SensorSettings(),
+        vehicle=flown,
+        sensor=_sensor(request, mission[1].sensor if mission else None),
         truth=truth,
         wind=request.wind,
         troubles=request.troubles,
@@ -155,7 +162,27 @@ def prepare_practice(request: PracticeRequest) -> Practice:
         boot_unix_s=time.time(),
         logs=request.logs,
     )
-    return Practice(settings, truth, notes)
+    return Practice(settings, truth, (*notes, *_too_windy(request.wind, flown)))
+
+
+def _sensor(request: PracticeRequest, planned: SensorProfile | None) -> SensorSettings:
+    """Return how the sensor measures: as asked for, else as the one that the mission was planned for."""
+    settings = request.sensor or SensorSettings()
+    if planned is not None:
+        noise_ppb = planned.noise_sd if planned.unit == "ppb" else settings.noise_ppb
+        settings = replace(settings, t90_s=planned.t90_s, noise_ppb=noise_ppb)
+    return replace(
+        settings,
+        t90_s=settings.t90_s if request.t90_s is None else request.t90_s,
+        noise_ppb=settings.noise_ppb if request.noise_ppb is None else request.noise_ppb,
+    )
+
+
+def _too_windy(wind: WindSettings, vehicle: Vehicle) -> tuple[str, ...]:
+    limit_m_s = AIRSPEED_PER_CRUISE * vehicle.cruise_m_s
+    if wind.speed_m_s <= limit_m_s:
+        return ()
+    return (f"A wind of {wind.speed_m_s:g} m/s is more than it flies against ({limit_m_s:g} m/s): it will be blown.",)
 
 
 def write_truth(practice: Practice, path: Path) -> None:
@@ -174,7 +201,8 @@ def write_truth(practice: Practice, path: Path) -> None:
     write_file(path, truth_netcdf(practice.truth, sensor.low_ppb, sensor.high_ppb))
 
 
-def _read_mission(folder: Path) -> tuple[MissionSpecification, Sidecar]:
+def _read_mission(path: Path) -> tuple[MissionSpecification, Sidecar]:
+    folder = path.parent if path.suffix == ".plan" and path.is_file() else path
     if not (folder / SPECIFICATION_FILE).is_file():
         raise MissionError(
             f"'{folder}' is not a mission folder: it has no {SPECIFICATION_FILE}; make one with 'sparsor plan'"

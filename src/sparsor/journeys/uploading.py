@@ -7,8 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sparsor.core.progress import silent
-from sparsor.errors import LinkError, MissionError, StoppedError
+from sparsor.errors import InputError, LinkError, MissionError, StoppedError
+from sparsor.journeys.folder import SPECIFICATION_FILE
 from sparsor.link.connection import Connection
+from sparsor.link.flights.briefing import brief
 from sparsor.link.flights.flying import Flight
 from sparsor.link.flights.modes import flight_modes
 from sparsor.link.flights.samples import SampleCounter
@@ -16,14 +18,18 @@ from sparsor.link.missions.upload import UploadReport, upload_plan
 from sparsor.link.ports.addresses import parse_address
 from sparsor.link.vehicles import find_vehicle
 from sparsor.mission import read_plan
+from sparsor.mission.specification import read_specification
+from sparsor.vehicle import load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from sparsor.core.progress import Progress
+    from sparsor.link.flights.briefing import Briefing
     from sparsor.link.flights.views import Event
     from sparsor.link.vehicles import FoundVehicle
+    from sparsor.vehicle import Vehicle
 
 
 def upload_mission(
@@ -35,7 +41,7 @@ def upload_mission(
     dry_run: bool = False,
     force: bool = False,
     enable_fence: bool = False,
-    start: Callable[[], bool] | None = None,
+    start: Callable[[UploadReport, Briefing, SampleCounter], bool] | None = None,
     timeout_s: float = 10.0,
     ready_timeout_s: float = 120.0,
     progress: Progress = silent,
@@ -55,9 +61,9 @@ def upload_mission(
     system_id : int or None
         Which vehicle, where there are several.
     dry_run, force, enable_fence : bool
-        As `upload_plan`.
+        As `upload_plan`; `force` also starts what `brief` would refuse.
     start : callable or None
-        Asked after the upload whether to arm and start; None: no.
+        Asked after the upload whether to arm and start; None: no. Gets the report, the briefing and the samples heard.
     timeout_s, ready_timeout_s : float
         How long to wait for the vehicle, and for its being ready to fly.
     progress : Progress
@@ -75,22 +81,24 @@ def upload_mission(
     """
     if start is not None and dry_run:
         raise LinkError("a dry run sends nothing, so nothing can be started: leave out --start or --dry-run")
-    plan = read_plan(choose_plan(path, sortie))
+    chosen = choose_plan(path, sortie)
+    plan = read_plan(chosen)
     with Connection(parse_address(url), timeout_s=timeout_s) as connection:
         samples = SampleCounter()
         connection.listen(samples)
         vehicle = find_vehicle(connection, system_id, timeout_s)
         samples.system_id = vehicle.system_id
         found(vehicle)
-        if start is not None:
-            flight_modes(vehicle)  # refuses what cannot be started before anything is sent
+        if start is not None:  # what cannot or must not be started is refused before anything is sent
+            flight_modes(vehicle)
+            briefing = brief(plan, connection, vehicle, profile=profile_of(chosen), force=force)
         report = upload_plan(
             plan, connection, vehicle, dry_run=dry_run, force=force, enable_fence=enable_fence, progress=progress
         )
         if start is None:
             return report
         try:
-            if not start():
+            if not start(report, briefing, samples):
                 return replace(report, started=False)
             with Flight(connection, vehicle, plan, samples, told=told) as flight:
                 flight.start(ready_timeout_s)
@@ -100,6 +108,15 @@ def upload_mission(
                 "new plan, perhaps under way",
             ) from None
         return replace(report, started=True)
+
+
+def profile_of(plan: Path) -> Vehicle | None:
+    """Return the vehicle that a plan of a mission folder was made for; None for anybody's plan."""
+    try:
+        spec = read_specification(plan.with_name(SPECIFICATION_FILE))
+        return load_vehicle(spec.flight.vehicle) if plan.stem.startswith(spec.name) else None
+    except InputError:
+        return None
 
 
 def choose_plan(path: Path, sortie: int | None = None) -> Path:
@@ -113,6 +130,8 @@ def choose_plan(path: Path, sortie: int | None = None) -> Path:
     if not path.exists():
         raise MissionError(f"there is no '{path}'; give a mission folder or a .plan")
     if not path.is_dir():
+        if path.suffix in (".npz", ".toml", ".waypoints", ".kml"):
+            raise MissionError(f"'{path}' is not a plan; give the mission folder '{path.parent}' or the .plan in it")
         return path
     plans = sorted(path.glob("*.plan"))
     if not plans:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sparsor.link.vehicles import FoundVehicle
 
 TICK_S: Final = 0.5
+SET_MESSAGE_INTERVAL: Final = 511  # MAV_CMD
 # What a map needs, and how often, Hz: a copter sends none of it until asked (MAV_CMD_SET_MESSAGE_INTERVAL).
 STREAMS: Final = {
     "GLOBAL_POSITION_INT": 5.0,
@@ -105,9 +106,10 @@ def record(
             took_s = time.monotonic() - begun_s
         return Recording(path, tlog.frames, connection.frames_received, took_s, vehicles)
     finally:
-        tlog.close()
-        if received == 0:  # nothing but our own heartbeats
-            path.unlink(missing_ok=True)
+        if received:
+            tlog.close()
+        else:  # nothing but our own heartbeats
+            tlog.discard()
 
 
 def request_streams(connection: Connection, vehicle: FoundVehicle) -> None:
@@ -118,11 +120,21 @@ def request_streams(connection: Connection, vehicle: FoundVehicle) -> None:
     LinkFailureError
         When the link is gone.
     """
+    for name in STREAMS:
+        connection.send(command_long(vehicle, SET_MESSAGE_INTERVAL, *stream_params(name)))
+
+
+def stream_params(name: str) -> tuple[float, float]:
+    """Return the parameters of MAV_CMD_SET_MESSAGE_INTERVAL for one of `STREAMS`.
+
+    Examples
+    --------
+    >>> stream_params("GLOBAL_POSITION_INT")
+    (33.0, 200000.0)
+    """
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-    for name, rate_hz in STREAMS.items():
-        number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-        connection.send(command_long(vehicle, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz))
+    return float(getattr(mavlink, f"MAVLINK_MSG_ID_{name}")), 1e6 / STREAMS[name]
 
 
 def _watch(

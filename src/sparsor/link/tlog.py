@@ -29,7 +29,7 @@ class TlogWriter:
     ----------
     path : Path
     replace : bool
-        Whether a file that is there may be replaced.
+        Whether a file that is there may be replaced; it is kept as NAME.before until the recording is closed.
 
     Raises
     ------
@@ -44,8 +44,11 @@ class TlogWriter:
         self.frames = 0
         self._lock = threading.Lock()
         self._clock_offset_ns = time.time_ns() - time.monotonic_ns()
+        self._before = path.with_name(f"{path.name}.before") if replace and path.is_file() else None
         try:
-            self._stream = path.open("wb" if replace else "xb", buffering=0)
+            if self._before is not None:
+                path.replace(self._before)
+            self._stream = path.open("xb", buffering=0)
         except FileExistsError as error:
             raise LinkError(f"'{path}' is there already; give another name, or --force to replace it") from error
         except OSError as error:
@@ -72,6 +75,18 @@ class TlogWriter:
             self.frames += 1
 
     def close(self) -> None:
-        """Close the file; nothing is written after that."""
+        """Close the file; nothing is written after that. Can be called twice."""
         with self._lock:
             self._stream.close()
+            if self._before is not None:
+                self._before.unlink(missing_ok=True)
+                self._before = None
+
+    def discard(self) -> None:
+        """Close and delete it, because nothing came of it: a file that it replaced is there again."""
+        with self._lock:
+            self._stream.close()
+            self.path.unlink(missing_ok=True)
+            if self._before is not None:
+                self._before.replace(self.path)
+                self._before = None

@@ -147,7 +147,7 @@ def _silence(
         "udpin": "Does the vehicle send to this computer and port (PX4's SITL to 14540, sim_vehicle.py to 14550)?",
         "udpout": "Is this the host and port it listens on? If it sends to us instead, give udpin://0.0.0.0:PORT.",
         "serial": "Is this the autopilot's port, and its baud rate (57600 for radios, 115200 for USB)?",
+        "tcpout": "Is this the autopilot's port, and is no other program connected to it (SITL serves one at a time)?",
         "tcpin": "Does the vehicle connect to this computer and port? To connect to it, give tcpout://HOST:PORT.",
     }
-    hint = hints.get(kind, "Is this the autopilot's port?")
-    return LinkFailureError(f"nothing came from {url} within {timeout_s:g} s. {hint}")
+    return LinkFailureError(f"nothing came from {url} within {timeout_s:g} s. {hints[kind]}")

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sparsor.errors import MissionError, ModelError
+from sparsor.errors import MissionError, ModelError, VehicleError
 from sparsor.geodesy.box import BoundingBox
 from sparsor.geodesy.grid import Grid
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_arrays, read_npz
+from sparsor.vehicle import SensorProfile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,6 +52,8 @@ class Sidecar:
         What the search expects of the flight.
     plans : mapping of str to str
         Plan file name to the SHA-256 of what was written, so that later edits are seen.
+    sensor : SensorProfile or None
+        What will measure, when that was said.
     """
 
     name: str
@@ -66,6 +69,7 @@ class Sidecar:
     lasso_weight: float
     expected: Mapping[str, float]
     plans: Mapping[str, str]
+    sensor: SensorProfile | None = None
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -83,6 +87,8 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
         "expected": dict(sidecar.expected),
         "plans": dict(sidecar.plans),
     }
+    if sidecar.sensor is not None:
+        about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
         {
             "sidecar": np.array(json.dumps(about, sort_keys=True)),
@@ -109,6 +115,8 @@ def read_sidecar(path: Path) -> Sidecar:
         return _from_arrays(about, arrays, model_from_arrays(arrays, f"'{path}'"))
     except ModelError as error:
         raise MissionError(str(error)) from None
+    except VehicleError as error:
+        raise MissionError(f"'{path}' holds a sensor that cannot be used: {error}") from None
     except MissionError:
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
@@ -145,4 +153,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         lasso_weight=float(about["lasso_weight"]),
         expected={str(key): float(value) for key, value in about["expected"].items()},
         plans={str(key): str(value) for key, value in about["plans"].items()},
+        sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
     )

@@ -141,6 +141,19 @@ class FlightSection(_Section):
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
 
 
+class SensorSection(_Section):
+    """What measures: a packaged profile's name or a profile's file, or the packaged sensor with another response."""
+
+    profile: str | None = None
+    t90_s: Annotated[FiniteFloat, Field(ge=0, le=86_400)] | None = None
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.profile is None) == (self.t90_s is None):
+            raise ValueError("give either a profile (--sensor-profile) or a response time (--t90)")
+        return self
+
+
 class OutputSection(_Section):
     """Which files are written beside the plan."""
 
@@ -155,13 +168,15 @@ class MissionSpecification(_Section):
     prior: PriorSection = PriorSection()
     search: SearchSection = SearchSection()
     flight: FlightSection = FlightSection()
+    sensor: SensorSection | None = None
     output: OutputSection = OutputSection()
 
     @property
     def inputs(self) -> tuple[Path, ...]:
         """The files that this mission is made from."""
-        vehicle = Path(self.flight.vehicle) if self.flight.vehicle.endswith(".toml") else None
-        paths = (self.area.file, self.prior.field, self.prior.model, vehicle)
+        sensor = None if self.sensor is None else self.sensor.profile
+        profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
+        paths = (self.area.file, self.prior.field, self.prior.model, *profiles)
         return tuple(path for path in paths if path is not None)
 
     @field_validator("name")
@@ -261,11 +276,15 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     flight = spec.flight
     if flight.vehicle.endswith(".toml"):
         flight = flight.model_copy(update={"vehicle": change(Path(flight.vehicle)).as_posix()})
+    sensor = spec.sensor
+    if sensor is not None and sensor.profile is not None and sensor.profile.endswith(".toml"):
+        sensor = sensor.model_copy(update={"profile": change(Path(sensor.profile)).as_posix()})
     return spec.model_copy(
         update={
             "area": moved(spec.area, "file"),
             "prior": moved(spec.prior, "field", "model"),
             "flight": flight,
+            "sensor": sensor,
         }
     )
 

@@ -3,5 +3,14 @@
 from sparsor.plot.coastline import coastline
 from sparsor.plot.picture import MissionPicture
 from sparsor.plot.preview import mission_preview
+from sparsor.plot.reconstruction import MapPicture, map_png, reconstruction_png, uncertainty_png
 
-__all__ = ["MissionPicture", "coastline", "mission_preview"]
+__all__ = [
+    "MapPicture",
+    "MissionPicture",
+    "coastline",
+    "map_png",
+    "mission_preview",
+    "reconstruction_png",
+    "uncertainty_png",
+]

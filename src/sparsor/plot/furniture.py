@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from sparsor.plot import style
-from sparsor.plot.layout import DPI, HEAD_IN, WIDTH_IN
+from sparsor.plot.layout import DPI, HEAD_IN
 from sparsor.plot.scales import degree_label, graticule, length_label, multiples, scale_bar_m
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def draw_words(figure: Figure, layout: Layout) -> None:
     caption = figure.text(*beneath, "\n".join(layout.caption), fontsize=7, va="top", linespacing=1.45)
     for text in (title, caption):
         text.set(color=style.INK, parse_math=False)
-        _fit(text, WIDTH_IN - 2 * layout.left_in)
+        _fit(text, layout.width_in - 2 * layout.left_in)
 
 
 def _fit(text: Text, width_in: float) -> None:

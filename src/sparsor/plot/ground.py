@@ -22,18 +22,36 @@ CROWDED_M_PER_INCH = 60_000.0
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw_prior(axes: Axes, view: View, picture: MissionPicture) -> tuple[ScalarMappable, str, str] | None:
-    """Draw the expected map, a colour to a cell; return what its colour bar needs: colours, label, unit."""
+def draw_prior(
+    axes: Axes,
+    view: View,
+    picture: MissionPicture,
+    *,
+    colour_map: str = style.COLOUR_MAP,
+    lowest: float | None = None,
+) -> tuple[ScalarMappable, str, str] | None:
+    """Draw the map, a colour to a cell; return what its colour bar needs: colours, label, unit.
+
+    Parameters
+    ----------
+    axes : Axes
+    view : View
+    picture : MissionPicture
+    colour_map : str
+    lowest : float, optional
+        Value of the first colour; the map's least by default.
+    """
     from matplotlib import colormaps
 
     if picture.prior is None:
         return None
     values, power = scaled(picture.prior)
-    colours = colormaps[style.COLOUR_MAP].with_extremes(bad=style.NO_VALUE)
+    colours = colormaps[colour_map].with_extremes(bad=style.NO_VALUE)
     image = axes.imshow(
         np.ma.masked_invalid(values),
         extent=box_extent(view, picture),
         cmap=colours,
+        vmin=lowest,
         interpolation="nearest",
         aspect="auto",
         zorder=1,
@@ -53,12 +71,17 @@ def scaled(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
     >>> scaled(np.array([20.0, 80.0]))
     (array([20., 80.]), '')
     """
+    power = power_of_ten(values)
+    if power == 0:
+        return values, ""
+    return values / 10.0**power, "10" + str(power).translate(SUPERSCRIPT)
+
+
+def power_of_ten(values: NDArray[np.float64]) -> int:
+    """Return the power of ten to take out of values; 0 where they read well as they are."""
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max(initial=0.0))
-    if largest == 0.0 or 1e-2 <= largest < 1e5:
-        return values, ""
-    power = int(np.floor(np.log10(largest)))
-    return values / 10.0**power, "10" + str(power).translate(SUPERSCRIPT)
+    return 0 if largest == 0.0 or 1e-2 <= largest < 1e5 else int(np.floor(np.log10(largest)))
 
 
 def draw_outside(axes: Axes, view: View, picture: MissionPicture) -> None:

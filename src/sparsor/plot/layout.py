@@ -31,8 +31,9 @@ CAPTION_CHARACTERS = 130
 
 @dataclass(frozen=True)
 class Layout:
-    """The page: its height, the map's corners, the column, and the words cut into lines."""
+    """The page: its size, the map's corners, the column, and the words cut into lines."""
 
+    width_in: float
     height_in: float
     left_in: float
     map_left_in: float
@@ -59,7 +60,7 @@ class Layout:
 
     def share(self, x_in: float, y_in: float) -> tuple[float, float]:
         """Return a place as shares of the page, as matplotlib wants it."""
-        return x_in / WIDTH_IN, y_in / self.height_in
+        return x_in / self.width_in, y_in / self.height_in
 
     def axes_in(self, figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
         """Return new axes of a given place and size, with inches as units and nothing drawn."""
@@ -69,17 +70,28 @@ class Layout:
         return axes
 
 
-def layout_of(picture: MissionPicture, view: View) -> Layout:
-    """Return the layout for a view and the words around it; a narrow map stands in the middle of its room."""
-    title = _lines((picture.title,), TITLE_CHARACTERS, MAX_TITLE_LINES)
-    caption = _lines(picture.caption, CAPTION_CHARACTERS, MAX_CAPTION_LINES)
+def layout_of(picture: MissionPicture, view: View, *, maps: int = 1, place: int = 0) -> Layout:
+    """Return the layout for a view and the words around it; a narrow map stands in the middle of its room.
+
+    Parameters
+    ----------
+    picture : MissionPicture
+    view : View
+    maps : int
+        How many maps, each with its column, stand side by side on the page.
+    place : int
+        Which of them this is, from 0 at the left.
+    """
+    title = _lines((picture.title,), TITLE_CHARACTERS * maps, MAX_TITLE_LINES)
+    caption = _lines(picture.caption, CAPTION_CHARACTERS * maps, MAX_CAPTION_LINES)
     bottom = 0.34 + (0.1 + LINE_IN * len(caption) if caption else 0.0)
     top = 0.22 + TITLE_LINE_IN * len(title)
     spare_in = MAP_WIDTH_IN - view.width_in
     return Layout(
+        width_in=maps * WIDTH_IN,
         height_in=bottom + view.height_in + top,
         left_in=0.22,
-        map_left_in=LABELS_IN + spare_in / 2,
+        map_left_in=place * WIDTH_IN + LABELS_IN + spare_in / 2,
         map_bottom_in=bottom,
         map_width_in=view.width_in,
         map_height_in=view.height_in,

@@ -22,8 +22,10 @@ SAME_PLACE_IN = 0.02
 WINDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 
-def legend_entries(view: View, picture: MissionPicture, *, coast: bool) -> tuple[list[Handle], list[str]]:
-    """Return handles and labels of everything that the map of a picture shows."""
+def legend_entries(
+    view: View, picture: MissionPicture, *, coast: bool, outside: str = "not flown"
+) -> tuple[list[Handle], list[str]]:
+    """Return handles and labels of everything that the map of a picture shows; `outside` names greyed-out cells."""
     from matplotlib.patches import Patch
 
     entries: list[tuple[Handle, str]] = []
@@ -40,7 +42,7 @@ def legend_entries(view: View, picture: MissionPicture, *, coast: bool) -> tuple
     if picture.area:
         entries.append((_line(style.AREA), "area"))
     if picture.outside is not None and picture.outside.any():
-        entries.append((Patch(facecolor=style.GREYED_OUT, edgecolor=style.FAINT_INK, linewidth=0.4), "not flown"))
+        entries.append((Patch(facecolor=style.GREYED_OUT, edgecolor=style.FAINT_INK, linewidth=0.4), outside))
     if coast:
         entries.append((_line({**style.COAST, "linewidth": 0.75}), "coastline (GSHHG)"))
     return [handle for handle, _ in entries], [label for _, label in entries]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
-from sparsor.plot import furniture, ground, style
-from sparsor.plot.layout import DPI, WIDTH_IN, layout_of
+from sparsor.plot import furniture, ground
+from sparsor.plot.layout import layout_of
 from sparsor.plot.legend import legend_entries
+from sparsor.plot.page import map_axes, page_png
 from sparsor.plot.route import draw_home, draw_route, draw_stops, draw_transit
 from sparsor.plot.view import view_of
 
@@ -33,23 +33,13 @@ def mission_preview(picture: MissionPicture) -> bytes:
     bytes
         A PNG, 1400 pixels wide and about 1200 high.
     """
-    from matplotlib import style as matplotlib_style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     view = view_of(picture)
     layout = layout_of(picture, view)
-    with matplotlib_style.context("default"):  # whatever the user's own settings are
-        figure = Figure(figsize=(WIDTH_IN, layout.height_in), dpi=DPI, facecolor="white")
-        _draw(figure, layout, view, picture)
-        stream = io.BytesIO()
-        FigureCanvasAgg(figure)
-        figure.savefig(stream, format="png", metadata={"Software": "sparsor", "Title": picture.title})
-    return stream.getvalue()
+    return page_png(layout, picture.title, lambda figure: _draw(figure, layout, view, picture))
 
 
 def _draw(figure: Figure, layout: Layout, view: View, picture: MissionPicture) -> None:
-    axes = _map_axes(figure, layout, view)
+    axes = map_axes(figure, layout, view)
     prior = ground.draw_prior(axes, view, picture)
     ground.draw_outside(axes, view, picture)
     ground.draw_cells(axes, view, picture)
@@ -65,16 +55,6 @@ def _draw(figure: Figure, layout: Layout, view: View, picture: MissionPicture) -
     furniture.draw_words(figure, layout)
     # imshow and plot move the limits; the view decides.
     axes.set(xlim=(view.west_deg, view.east_deg), ylim=(view.south_deg, view.north_deg))
-
-
-def _map_axes(figure: Figure, layout: Layout, view: View) -> Axes:
-    axes = layout.axes_in(figure, layout.map_left_in, layout.map_bottom_in, layout.map_width_in, layout.map_height_in)
-    axes.axis("on")
-    axes.set_facecolor(style.PAPER)
-    axes.set(xlim=(view.west_deg, view.east_deg), ylim=(view.south_deg, view.north_deg))
-    for edge in axes.spines.values():
-        edge.set(linewidth=0.6, color=style.INK)
-    return axes
 
 
 def _draw_flight(axes: Axes, view: View, picture: MissionPicture) -> None:

@@ -29,7 +29,7 @@ def graticule(low_deg: float, high_deg: float, at_most: int) -> tuple[NDArray[np
     >>> values.tolist(), step
     ([51.5, 51.51, 51.52, 51.53], 0.01)
     """
-    step = _round_up((high_deg - low_deg) / at_most)
+    step = round_step((high_deg - low_deg) / at_most)
     return multiples(low_deg, high_deg, step), step
 
 
@@ -84,6 +84,12 @@ def length_label(length_m: float) -> str:
     return f"{length_m:g} m" if length_m < 1000.0 else f"{length_m / 1000.0:g} km"
 
 
+def round_step(value: float) -> float:
+    """Return the least round number, 1, 2 or 5 times a power of ten, that is not below a value above 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return min(factor * power for factor in (*ROUND, 10.0) if factor * power >= value * (1 - 1e-9))
+
+
 def decimals_of(step: float) -> int:
     """Return how many decimals a round step has.
 
@@ -93,8 +99,3 @@ def decimals_of(step: float) -> int:
     (3, 0)
     """
     return max(0, -math.floor(math.log10(step) + 1e-9))
-
-
-def _round_up(value: float) -> float:
-    power = 10.0 ** math.floor(math.log10(value))
-    return min(factor * power for factor in (*ROUND, 10.0) if factor * power >= value * (1 - 1e-9))

@@ -11,6 +11,7 @@ from typing import Any
 Style = dict[str, Any]
 
 COLOUR_MAP = "viridis"
+UNCERTAINTY_MAP = "magma"
 PAPER = "#f3f3f0"
 INK = "#1a1a1a"
 FAINT_INK = "#5a5a5a"
@@ -47,11 +48,30 @@ HOME: Style = {
     "markeredgewidth": 0.8,
     "zorder": 7,
 }
+TRACK_CASING: Style = {"color": INK, "linewidth": 2.2, "solid_joinstyle": "round", "zorder": 5}
+TRACK: Style = {"color": "white", "linewidth": 1.2, "solid_joinstyle": "round", "zorder": 5.1}
+SAMPLE: Style = {"s": 9, "edgecolors": "white", "linewidths": 0.5, "zorder": 6}
+SAMPLE_ENTRY: Style = {
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 3.4,
+    "markerfacecolor": FAINT_INK,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.5,
+}
+LEFT_OUT: Style = {
+    "linestyle": "none",
+    "marker": "x",
+    "markersize": 4.2,
+    "markeredgecolor": VERMILLION,
+    "markeredgewidth": 1.1,
+    "zorder": 6.1,
+}
 FENCE: Style = {"color": VERMILLION, "linewidth": 1.1, "dashes": (5, 2.5), "zorder": 3.5}
 AREA_CASING: Style = {"color": "white", "linewidth": 2.0, "zorder": 3}
 AREA: Style = {"color": INK, "linewidth": 1.0, "zorder": 3.1}
 BOX: Style = {"color": INK, "linewidth": 0.7, "zorder": 2.9}
-COAST_CASING: Style = {"color": "white", "alpha": 0.75, "zorder": 2.5}
+COAST_CASING: Style = {"color": "white", "alpha": 0.5, "zorder": 2.5}
 COAST: Style = {"color": "#12263a", "zorder": 2.6}
 CELLS: Style = {"colors": "white", "linewidths": 0.3, "alpha": 0.22, "zorder": 2}
 GRATICULE: Style = {"color": INK, "linewidth": 0.35, "alpha": 0.3, "linestyle": (0, (1, 2)), "zorder": 2.2}

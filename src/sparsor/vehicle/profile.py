@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from sparsor.core.tomlmodel import model_of_file, model_of_mapping, model_of_toml
 from sparsor.errors import VehicleError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from pydantic_core import ErrorDetails
 
 # MAV_TYPE of each kind (MAVLink common.xml). A new kind is an entry here and in `Kind`, a packaged profile,
 # and its own sequence of items in mission.
@@ -85,10 +83,7 @@ class Vehicle(BaseModel):
         VehicleError
             When a key is unknown or missing or a value is not allowed; names the first of them.
         """
-        try:
-            return cls.model_validate(dict(values))
-        except ValidationError as error:
-            raise VehicleError(_sentence(error.errors()[0], source, list(cls.model_fields))) from error
+        return model_of_mapping(cls, values, source, VehicleError)
 
 
 def packaged_vehicles() -> list[str]:
@@ -117,35 +112,10 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """
     text = str(name_or_path)
     if text.lower().endswith(".toml"):
-        return _parse(_read(Path(text)), f"the vehicle profile '{text}'")
+        return model_of_file(Vehicle, Path(text), "vehicle profile", VehicleError)
     if text in packaged_vehicles():
         packaged = resources.files("sparsor.vehicle") / "profiles" / f"{text}.toml"
-        return _parse(packaged.read_bytes(), f"the packaged profile '{text}'")
+        return model_of_toml(Vehicle, packaged.read_bytes(), f"the packaged profile '{text}'", VehicleError)
     raise VehicleError(
         f"unknown vehicle '{text}'; known are {', '.join(packaged_vehicles())}, or give the path of a .toml file"
     )
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise VehicleError(f"cannot read the vehicle profile '{path}': {error.strerror or error}") from error
-
-
-def _parse(content: bytes, source: str) -> Vehicle:
-    try:
-        values = tomllib.loads(content.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise VehicleError(f"{source} is not TOML: {error}") from error
-    return Vehicle.from_mapping(values, source)
-
-
-def _sentence(error: ErrorDetails, source: str, keys: list[str]) -> str:
-    key = ".".join(str(part) for part in error["loc"])
-    if error["type"] == "extra_forbidden":
-        return f"{source}: unknown key '{key}'; known are {', '.join(keys)}"
-    if error["type"] == "missing":
-        return f"{source}: the key '{key}' is missing"
-    allowed = error["msg"][0].lower() + error["msg"][1:]
-    return f"{source}: {key} = {error['input']!r} is not allowed: {allowed}"

@@ -110,6 +110,25 @@ def test_the_uncertainty_holds_on_maps_that_were_never_seen(model, fresh, cells,
         assert abs(np.mean(expected[name]) - np.mean(realised[name])) < 3 * error, name
 
 
+def test_a_drift_that_is_stated_does_not_break_the_uncertainty(model, fresh, cells):
+    rng = np.random.default_rng(8)
+    drift = np.linspace(0, 25, cells.size)
+    covered, errors, ignored = ({name: [] for name in CHOICES} for _ in range(3))
+    for number, one in enumerate(fresh[:14]):
+        truth = 20 + 60 * one
+        steady = measured(truth, cells, 2.0, number)
+        values = steady.values + drift * rng.standard_normal()
+        stated = decode_each(Measurements(steady.weights, values, steady.variance, drift), model)
+        unstated = decode_each(replace(steady, values=values), model)
+        for name, decoded in stated.items():
+            covered[name].append(np.mean(np.abs(truth - decoded.values) <= 1.96 * decoded.standard_deviation))
+            errors[name].append(centred_relative_error(truth[None], decoded.values[None])[0])
+            ignored[name].append(centred_relative_error(truth[None], unstated[name].values[None])[0])
+    for name in CHOICES:
+        assert 0.88 < np.mean(covered[name]) < 0.995, name
+        assert np.mean(errors[name]) < 0.9 * np.mean(ignored[name]), name
+
+
 def test_auto_takes_the_decoder_with_the_lowest_score(model, ppb, cells):
     one = measured(ppb, cells, 1.0)
     decoded = decode(one, model)

@@ -42,10 +42,10 @@ def given_amplitude(C, H, noise, y, tau):
 
 
 def universal_kriging(C, H, noise, y, tau):
-    """Kriging weights from the textbook's bordered system."""
+    """Kriging weights from the textbook's bordered system; `noise` is variances or a covariance."""
     m = len(H)
     system = np.zeros((m + 1, m + 1))
-    system[:m, :m] = tau**2 * H @ C @ H.T + np.diag(noise)
+    system[:m, :m] = tau**2 * H @ C @ H.T + (np.diag(noise) if noise.ndim == 1 else noise)
     system[m, :m] = system[:m, m] = 1
     right = np.vstack([tau**2 * H @ C, np.ones(len(C))])
     solved = np.linalg.solve(system, right)
@@ -102,6 +102,18 @@ def test_the_nugget_is_noise_that_grows_with_the_amplitude(case, monkeypatch):
     found, expected = System(C, H, noise, nugget).posterior(values), System(C, H, noise + 9 * nugget).posterior(values)
     np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9)
     np.testing.assert_allclose(found.variance, expected.variance, rtol=1e-9)
+
+
+def test_a_drift_is_noise_that_all_readings_share(case, monkeypatch):
+    C, H, noise, values = case
+    fixed(monkeypatch, 1.3)
+    drift = np.linspace(0, 2, len(H))
+    found = System(C, H, noise, drift=drift).posterior(values)
+    for y, mean, variance in zip(values, found.mean, found.variance, strict=True):
+        expected, expected_variance = universal_kriging(C, H, np.diag(noise) + np.outer(drift, drift), y, 1.3)
+        np.testing.assert_allclose(mean, expected, rtol=1e-9)
+        np.testing.assert_allclose(variance, expected_variance, rtol=1e-8)
+    np.testing.assert_allclose(found.mean, found.level[:, None] + found.pull @ H @ C, rtol=1e-9)
 
 
 def test_the_likelihood_of_the_amplitude_is_that_of_contrasts(case):

@@ -11,6 +11,13 @@ def cells(*which):
     return np.eye(9)[list(which)]
 
 
+def test_a_drift_that_fits_no_measurement_is_refused():
+    with pytest.raises(DesignError, match="do not fit"):
+        Measurements(cells(1, 2), np.ones(2), np.ones(2), np.ones(3))
+    with pytest.raises(DesignError, match="the drift's shares hold"):
+        Measurements(cells(1, 2), np.ones(2), np.ones(2), np.array([0.0, np.nan]))
+
+
 @pytest.mark.parametrize(
     ("weights", "values", "variance", "words"),
     [
@@ -32,12 +39,13 @@ def test_what_cannot_be_decoded_is_refused(weights, values, variance, words):
 def test_the_order_does_not_depend_on_the_one_they_came_in():
     rng = np.random.default_rng(1)
     weights = np.concatenate([cells(1, 1, 4, 8), rng.dirichlet(np.ones(9), 12)])
-    values, variance = rng.normal(size=16), rng.uniform(0, 1, 16)
-    first = Measurements(weights, values, variance).in_order()
+    values, variance, drift = rng.normal(size=16), rng.uniform(0, 1, 16), rng.normal(size=16)
+    first = Measurements(weights, values, variance, drift).in_order()
     for _ in range(5):
         order = rng.permutation(16)
-        other = Measurements(weights[order], values[order], variance[order]).in_order()
+        other = Measurements(weights[order], values[order], variance[order], drift[order]).in_order()
         np.testing.assert_array_equal(other.weights, first.weights)
         np.testing.assert_array_equal(other.values, first.values)
         np.testing.assert_array_equal(other.variance, first.variance)
+        np.testing.assert_array_equal(other.drift_sd, first.drift_sd)
     assert sorted(first.values) == sorted(values)

@@ -96,9 +96,10 @@ def test_a_mission_is_flown_and_recorded_with_nothing_lost(autopilot, plan_file)
     assert witness.views[-1].left_m < 5
 
 
-def test_a_mission_is_flown_over_a_link_that_loses_and_repeats(plan_file):
-    path = plan_file()
-    with practice(speedup=15) as server, BadLink(server.udp_port, loss=0.08, twice=0.05, seed=3) as link:
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_a_mission_is_flown_over_a_link_that_loses_and_repeats(autopilot, plan_file):
+    path = plan_file(autopilot)
+    with practice(autopilot, speedup=20) as server, BadLink(server.udp_port, loss=0.08, twice=0.05, seed=3) as link:
         report = flown(path, link.url, timeout_s=30)
         place, track = server.autopilot.flight.place, np.array(server.autopilot.track)
     assert report.result.outcome == "complete"
@@ -112,9 +113,9 @@ def test_a_mission_is_flown_over_a_link_that_loses_and_repeats(plan_file):
 )
 def test_a_vehicle_that_is_not_ready_is_waited_for_and_then_left_disarmed(autopilot, words, plan_file):
     path = plan_file(autopilot)
-    with practice(autopilot, speedup=1, ready_s=3000) as server:
+    with practice(autopilot, speedup=10, ready_s=3000) as server:
         with pytest.raises(LeftBehindError, match=words) as failed:
-            flown(path, url_of(server), ready_timeout_s=3)
+            flown(path, url_of(server), ready_timeout_s=1)
         assert failed.value.vehicle_state == "disarmed, it holds the plan"
         assert failed.value.exit_code == 1
         assert not server.autopilot.flight.armed
@@ -136,7 +137,8 @@ def test_it_arms_before_it_may_fly_and_is_started_again(plan_file, monkeypatch):
 
 def test_an_armed_vehicle_and_a_plan_for_another_autopilot_are_refused(plan_file):
     path = plan_file("px4")
-    with practice("px4", speedup=1, ready_s=0) as server:
+    with practice("px4", ready_s=0) as server:
+        server.autopilot.parameters.set("COM_DISARM_PRFLT", 0.0)
         server.autopilot.flight.arm(force=True)
         with pytest.raises(LinkError, match="armed"):
             flown(path, url_of(server))
@@ -178,13 +180,17 @@ def test_a_vehicle_that_is_disarmed_in_the_air_is_not_called_landed(plan_file):
     assert result.outcome == "disarmed in flight"
 
 
-def test_a_link_that_is_lost_in_flight(plan_file):
+def test_a_link_that_is_lost_in_flight(plan_file, monkeypatch):
+    monkeypatch.setattr("sparsor.link.flights.linkwatch.QUIET_S", 1.0)
     path = plan_file()
     with practice(speedup=10) as server:
         witness = Witness(at="item 3 of", do=server.stop)
         with pytest.raises(LeftBehindError, match=r"flies on by itself.*sparsor record") as failed:
-            flown(path, url_of(server), witness, lost_timeout_s=6)
+            flown(path, url_of(server), witness, lost_timeout_s=2)
+        record_on = f"sparsor record --connect {url_of(server)} -o {path.with_name('flight-2.tlog')}"
     assert failed.value.vehicle_state == "flies on by itself"
+    assert str(failed.value).endswith(record_on)
+    assert failed.value.recording == str(path.with_name("flight.tlog"))
     assert any("nothing was heard" in event.text and event.warning for event in witness.events)
     assert any(m.get_type() == "MISSION_ITEM_REACHED" for m in messages_of(path.with_name("flight.tlog")))
 
@@ -213,7 +219,7 @@ def test_a_ctrl_c_in_flight_may_return_home_go_on_or_leave(plan_file):
 
 
 def test_a_ctrl_c_before_take_off_disarms(plan_file):
-    with practice(speedup=1, ready_s=3000) as server:
+    with practice(speedup=10, ready_s=3000) as server:
         witness = Witness(at="waiting until it is ready", do=interrupt)
         with pytest.raises(StoppedError, match="before take-off"):
             flown(plan_file(), url_of(server), witness)

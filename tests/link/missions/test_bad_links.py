@@ -27,7 +27,8 @@ PATIENT_S = 30.0  # to hear a first heartbeat where a third of them is lost
 @pytest.fixture(params=["ardupilot", "px4"])
 def server(request):
     settings = PracticeSettings(home=KNOWN_HOME, flavour=flavour_named(request.param))
-    with PracticeServer(PracticeAutopilot(settings), udp=("127.0.0.1", 0)) as running:
+    # Its heartbeats come ten times a second; the mission protocol keeps to the wall clock.
+    with PracticeServer(PracticeAutopilot(settings), udp=("127.0.0.1", 0), speedup=10) as running:
         yield running, request.param
 
 
@@ -58,7 +59,7 @@ def test_an_upload_over_a_link_that_repeats(server):
 def test_everything_over_a_link_that_loses_a_third_and_delays(server):
     running, name = server
     with (
-        BadLink(running.udp_port, loss=0.3, twice=0.1, delay_s=0.1) as link,
+        BadLink(running.udp_port, loss=0.3, twice=0.1, delay_s=0.05) as link,
         Connection(link.url) as connection,
     ):
         vehicle, items = found_and_items(connection, name, 16)
@@ -85,7 +86,10 @@ def test_a_hundred_items_over_the_worst_link():
         assert len(items[MISSION]) >= 100
         with Transfer(connection, vehicle) as transfer:
             transfer.upload(MISSION, items[MISSION])
-            assert not harm(vehicle, MISSION, items[MISSION], transfer.download(MISSION))
+        stored = running.autopilot.store.items[MISSION]
+    assert [(item.command, item.x, item.y) for item in stored[1:]] == [
+        (item.command, item.x, item.y) for item in items[MISSION][1:]
+    ]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -194,6 +198,50 @@ def test_when_the_last_word_is_lost_what_the_vehicle_holds_tells():
     assert counts
 
 
-def test_a_vehicle_that_loses_what_it_was_sent_is_found_out():
+def test_a_vehicle_that_loses_what_it_was_sent_is_found_out(monkeypatch):
+    monkeypatch.setattr("sparsor.link.missions.resending.ATTEMPTS", 1)
     with pytest.raises(LinkFailureError, match="sending mission failed"):
         sent_to(Refusing())
+
+
+class Unwilling(VehicleEndpoint):
+    """Refuses to clear, to list and to set a current item."""
+
+    def on_mission_clear_all(self, message):
+        self.ack(message, mavlink.MAV_MISSION_DENIED, message.mission_type)
+
+    def on_mission_request_list(self, message):
+        self.ack(message, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+
+    def on_mission_set_current(self, message):
+        pass
+
+    def on_command_long(self, message):
+        self.send(mavlink.MAVLink_command_ack_message(message.command, mavlink.MAV_RESULT_DENIED))
+
+
+def test_what_a_vehicle_does_not_do_is_said(monkeypatch):
+    monkeypatch.setattr("sparsor.link.missions.resending.ANSWER_S", 0.5)
+    with Unwilling() as endpoint, Connection(endpoint.url) as connection:
+        resender = Resender(connection, find_vehicle(connection, 1))
+        with pytest.raises(LinkFailureError, match=r"does not clear its mission \(result 14\)"):
+            resender.clear(MISSION)
+        with pytest.raises(LinkFailureError, match="keeps no mission"):
+            resender.download(MISSION)
+        with pytest.raises(LinkFailureError, match="does not set the current item to 2"):
+            resender.set_current(2)
+
+
+def test_a_transfer_that_gets_no_further_ends(monkeypatch):
+    for part in ("sending", "reading"):
+        monkeypatch.setattr(f"sparsor.link.missions.{part}.PATIENCE_S", 0.8)
+    endpoint = VehicleEndpoint()
+    endpoint.on_mission_item_int = lambda _message: None
+    endpoint.on_mission_request_list = lambda _message: None
+    with endpoint, Connection(endpoint.url) as connection:
+        vehicle, items = found_and_items(connection, "ardupilot", 6)
+        resender = Resender(connection, vehicle)
+        with pytest.raises(LinkFailureError, match="sending mission failed: the vehicle stopped asking at item 0"):
+            resender.upload(MISSION, items[MISSION])
+        with pytest.raises(LinkFailureError, match="reading its mission failed: the vehicle does not answer"):
+            resender.download(MISSION)

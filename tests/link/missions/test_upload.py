@@ -11,7 +11,7 @@ import pytest
 
 from link.vehicle_endpoint import ARDUPILOT, PX4, Vehicle, VehicleEndpoint
 from mission_strategies import example_plan
-from sparsor.errors import InputError, LinkError, LinkFailureError, MissionError
+from sparsor.errors import InputError, LinkError, LinkFailureError, MissionError, StoppedError
 from sparsor.journeys.uploading import choose_plan, upload_mission
 from sparsor.link.connection import Connection
 from sparsor.link.missions.checks import check_plan
@@ -185,6 +185,32 @@ def test_the_old_plan_is_back_after_a_refusal():
     with pytest.raises(LinkFailureError, match="old plan again"):
         uploaded(vehicle, example_plan(stops=12))
     assert {kind: held(vehicle, kind)[1:] for kind in before} == {kind: items[1:] for kind, items in before.items()}
+
+
+def test_a_vehicle_that_takes_neither_the_new_plan_nor_the_old_is_emptied():
+    vehicle = Vehicle()
+    uploaded(vehicle, example_plan(stops=3))
+    vehicle.room = 2
+    with pytest.raises(LinkFailureError, match="the new plan was cleared, it holds none now") as failed:
+        uploaded(vehicle, example_plan(stops=12))
+    assert failed.value.vehicle_state == "the new plan was cleared, it holds none now"
+    assert vehicle.stored == {0: [], 1: [], 2: []}
+
+
+def test_a_second_ctrl_c_leaves_the_state_unknown(monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sparsor.link.missions.upload._sent", interrupt)
+    monkeypatch.setattr("sparsor.link.missions.upload._restored", interrupt)
+    with pytest.raises(StoppedError, match=r"interrupted\. The vehicle: state unknown, do not arm") as stopped:
+        uploaded(Vehicle())
+    assert (stopped.value.exit_code, stopped.value.vehicle_state) == (130, "state unknown, do not arm")
+
+
+def test_a_plan_for_another_kind_of_vehicle_is_sent_with_a_warning():
+    rover = FoundVehicle(1, 1, 3, 10, armed=False)
+    assert any("another kind of vehicle (MAV_TYPE 2)" in sentence for sentence in check_plan(example_plan(), rover))
 
 
 def test_a_link_that_dies_leaves_the_state_unknown(monkeypatch):

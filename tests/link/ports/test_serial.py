@@ -30,7 +30,7 @@ def test_a_plan_goes_to_a_vehicle_on_a_serial_line(line, form):
     plan = example_plan(stops=5)
     address = form.format(line.path if form != "{}" else line.path.readlink())
     vehicle = PracticeAutopilot(PracticeSettings(plan.home, flavour_named("ardupilot")))
-    with PracticeServer(vehicle, tcp=("127.0.0.1", 0)) as server, Bridge(line, server.tcp_port):
+    with PracticeServer(vehicle, tcp=("127.0.0.1", 0), speedup=5) as server, Bridge(line, server.tcp_port):
         with Connection(address) as connection:
             found = find_vehicle(connection, timeout_s=20)
             report = upload_plan(plan, connection, found)

@@ -80,7 +80,7 @@ def test_a_tcp_port_where_nobody_listens(plan):
 
 @pytest.mark.parametrize(
     ("speaks", "words"),
-    [(b"", "Is this the autopilot's port?"), (b"SSH-2.0-x\r\n", "it is the port of something else")],
+    [(b"", "is no other program connected to it"), (b"SSH-2.0-x\r\n", "it is the port of something else")],
 )
 def test_the_tcp_port_of_another_program(plan, speaks, words):
     with another_program(speaks) as port:

@@ -257,6 +257,14 @@ def test_more_than_the_rate_is_left_out(tmp_path):
     assert (result.sent, result.left_out) == (20, 80)
 
 
+def test_an_outlet_that_is_closed_does_not_say_that_it_tries_again(monkeypatch):
+    monkeypatch.setattr("sparsor.link.sensing.outlet.FIND_S", 0.3)
+    said = []
+    with Outlet("udpout://127.0.0.1:9", system_id=None, say=said.append):
+        pass
+    assert said == []
+
+
 def test_a_file_says_what_is_missing_or_wrong_in_it(tmp_path):
     path = tmp_path / "day.csv"
     path.write_text("a;b\n1;2\n")

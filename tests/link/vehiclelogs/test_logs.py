@@ -43,6 +43,9 @@ def test_the_last_log_and_all_of_them_under_the_vehicles_names(autopilot, tmp_pa
         assert [one.file.read_bytes() for one in made] == held
         names = {"ardupilot": "00000002.BIN", "px4": "log_1_2023-11-14-22-13-36.ulg"}
         assert made[1].file.name == names[autopilot]
+        new = tmp_path / "new"
+        (in_folder,) = download(url_of(server), new, into_folder=True, timeout_s=10).logs
+        assert in_folder.file == new / names[autopilot]
         (by_number,) = download(url_of(server), tmp_path, number=first, timeout_s=10).logs
         assert by_number.file.read_bytes() == held[0]
         assert by_number.file.parent == tmp_path

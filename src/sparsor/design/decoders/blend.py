@@ -57,13 +57,13 @@ def choose_blend(setting: Setting, rehearsal: Rehearsal) -> Blend:
     kernels = {
         length: _Part.of(kernel_covariance(shape, Kernel(1.0, length, 0.0), allowed), rows) for length in LENGTHS_CELLS
     }
-    noise = setting.noise / rehearsal.amplitude**2 + setting.nugget
+    noise = setting.noise.covariance / rehearsal.amplitude**2 + np.diag(setting.nugget)
 
     @cache
     def error(blend: Blend) -> float:
         mixed = own.mixed(blend.alpha, kernels[blend.length_cells])
         try:
-            return rehearsal.mean_error(mixed.decode(rehearsal.values, noise + blend.nugget))
+            return rehearsal.mean_error(mixed.decode(rehearsal.values, noise, blend.nugget))
         except LinAlgError:  # too smooth for readings without noise
             return np.inf
 
@@ -91,12 +91,13 @@ class _Part:
     def mixed(self, share: float, other: _Part) -> _Part:
         return _Part(share * self.towards + (1 - share) * other.towards, share * self.inner + (1 - share) * other.inner)
 
-    def decode(self, values: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    def decode(self, values: NDArray[np.float64], noise: NDArray[np.float64], nugget: float) -> NDArray[np.float64]:
         """Return the maps (n, N) of measured values (n, m) by universal kriging with unknown level."""
-        inner = self.inner + np.diag(noise)
+        inner = self.inner + noise
+        inner[np.diag_indices_from(inner)] += nugget
         solved = cho_solve(
             cho_factor(inner, lower=True, overwrite_a=True, check_finite=False),
-            np.column_stack([values.T, np.ones(noise.size)]),
+            np.column_stack([values.T, np.ones(len(inner))]),
             check_finite=False,
         )
         ones = solved[:, -1]

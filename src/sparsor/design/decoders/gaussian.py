@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_array
 
+from sparsor.design.decoders.noise import Noise
 from sparsor.design.decoders.setting import Estimate, value_scale
 
 if TYPE_CHECKING:
@@ -34,9 +35,11 @@ class System:
     weights : array of float64 (m, N)
         H.
     noise : array of float64 (m,)
-        Variances R, all above 0.
+        Variances D, all above 0.
     nugget : array of float64 (m,) or float
         W: variance of the readings around what H says, as a share of the amplitude's square.
+    drift : array of float64 (m,), optional
+        u: ``R = D + u u^T``.
     """
 
     def __init__(
@@ -45,22 +48,23 @@ class System:
         weights: NDArray[np.float64],
         noise: NDArray[np.float64],
         nugget: NDArray[np.float64] | float = 0.0,
+        drift: NDArray[np.float64] | None = None,
     ) -> None:
-        self._root_noise = np.sqrt(noise)
+        self._noise = Noise(noise, np.zeros_like(noise) if drift is None else drift)
         rows = csr_array(weights)
         towards = np.asarray(rows @ covariance).T
         inner = np.asarray(rows @ towards)
         inner[np.diag_indices_from(inner)] += nugget
-        eigenvalues, self._axes = np.linalg.eigh(inner / np.outer(self._root_noise, self._root_noise))
+        eigenvalues, self._axes = np.linalg.eigh(self._noise.whitened(self._noise.whitened(inner).T))
         self._strength = np.maximum(eigenvalues, 0.0)
-        self._towards = (towards / self._root_noise) @ self._axes  # N x m
-        self._ones = self._axes.T @ (1 / self._root_noise)
+        self._towards = self._noise.whitened(towards) @ self._axes  # N x m
+        self._ones = self._noise.whitened(np.ones_like(noise)) @ self._axes
         self._own = covariance.diagonal()
 
     def posterior(self, values: NDArray[np.float64]) -> Estimate:
         """Return the posterior of the maps measured as `values`, (n, m): one map a row."""
-        rotated = (values / self._root_noise) @ self._axes
-        tau, share = self._amplitudes(rotated, value_scale(values, self._root_noise**2))
+        rotated = self._noise.whitened(values) @ self._axes
+        tau, share = self._amplitudes(rotated, value_scale(values, self._noise.variance))
         damping = 1 / (tau[:, :, None] ** 2 * self._strength + 1)  # n x nodes x m
         precision = damping @ self._ones**2
         level = (damping * self._ones) @ rotated[:, :, None]
@@ -77,7 +81,7 @@ class System:
             mean=mean,
             variance=between + np.einsum("nk,nkc->nc", share, within),
             level=(share * level).sum(axis=1),
-            pull=(pull @ self._axes.T) / self._root_noise,
+            pull=self._noise.transposed(pull @ self._axes.T),
         )
 
     def _variances(

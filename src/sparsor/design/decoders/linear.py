@@ -47,7 +47,10 @@ class LinearDecoder:
     def system(self) -> System:
         """The linear system, factorised once."""
         readings = self.setting.measurements
-        return System(self.covariance, readings.weights, self.setting.noise, self.setting.nugget + self.nugget)
+        noise = self.setting.noise
+        return System(
+            self.covariance, readings.weights, noise.variance, self.setting.nugget + self.nugget, readings.drift_sd
+        )
 
     def decode(self, values: NDArray[np.float64]) -> Estimate:
         """Return the maps measured as `values`, (n, m): one map a row."""

@@ -19,7 +19,7 @@ _DIGITS = 9
 
 @dataclass(frozen=True)
 class Measurements:
-    """Measurements ``y = a + b (H s) + e`` of a map s, with ``e ~ N(0, diag(variance))``.
+    """Measurements ``y = a + b (H s) + e`` of a map s, with ``e ~ N(0, diag(variance) + drift drift^T)``.
 
     Parameters
     ----------
@@ -30,6 +30,8 @@ class Measurements:
         y, in the sensor's unit.
     variance : array of float64 (m,)
         Of the noise, in the square of the sensor's unit; 0 for readings without noise.
+    drift : array of float64 (m,), optional
+        What one standard deviation of the sensor's drift adds to each; None where there is none.
 
     Raises
     ------
@@ -47,10 +49,11 @@ class Measurements:
     weights: NDArray[np.float64]
     values: NDArray[np.float64]
     variance: NDArray[np.float64]
+    drift: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         shape = self.weights.shape
-        if self.weights.ndim != 2 or not shape[:1] == self.values.shape == self.variance.shape:
+        if self.weights.ndim != 2 or not shape[:1] == self.values.shape == self.variance.shape == self.drift_sd.shape:
             raise DesignError(
                 f"weights of shape {shape} do not fit {self.values.shape} values and {self.variance.shape} variances: "
                 "each measurement has one row of weights, one value and one variance"
@@ -60,7 +63,13 @@ class Measurements:
                 f"{shape[0]} measurement(s) in {self.cells.size} cell(s): level and amplitude are unknown, so a map "
                 f"needs measurements in at least {LEAST_CELLS} cells"
             )
-        for name, array in (("weights", self.weights), ("values", self.values), ("variances", self.variance)):
+        named = {
+            "weights": self.weights,
+            "values": self.values,
+            "variances": self.variance,
+            "drift's shares": self.drift_sd,
+        }
+        for name, array in named.items():
             if not np.isfinite(array).all():
                 raise DesignError(f"the {name} hold something that is not a number: leave those measurements out")
         if self.variance.min() < 0:
@@ -78,6 +87,11 @@ class Measurements:
         return int(self.values.size)
 
     @property
+    def drift_sd(self) -> NDArray[np.float64]:
+        """The drift's share in each measurement, 0 where there is none."""
+        return np.zeros_like(self.values) if self.drift is None else self.drift
+
+    @property
     def cells(self) -> NDArray[np.int64]:
         """Cells that any measurement has a share of, ascending."""
         return np.flatnonzero(self.weights.any(axis=0))
@@ -87,5 +101,5 @@ class Measurements:
         column = np.arange(1, self.weights.shape[1] + 1)
         # Rounded, because a sum over several cells may end in other digits when the row lies elsewhere in memory.
         place, second = (np.round(self.weights @ np.sqrt(column * scale), _DIGITS) for scale in (2.0, 3.0 * column))
-        order = np.lexsort((self.variance, self.values, second, place))
-        return Measurements(self.weights[order], self.values[order], self.variance[order])
+        order = np.lexsort((self.drift_sd, self.variance, self.values, second, place))
+        return Measurements(self.weights[order], self.values[order], self.variance[order], self.drift_sd[order])

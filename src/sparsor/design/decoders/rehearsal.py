@@ -31,7 +31,7 @@ class Rehearsal:
     maps : array of float64 (n, N)
         In the sensor's unit, level 0.
     values : array of float64 (n, m)
-        Measured with the stated noise.
+        Measured with the stated noise, drift included.
     allowed : array of bool (N,)
         Cells that count.
     amplitude : float
@@ -72,5 +72,7 @@ def rehearse(setting: Setting, amplitude: float) -> Rehearsal:
     if not len(maps):
         raise DesignError("the validation maps have no contrast inside the area: no decoder can be judged on them")
     spread = np.sqrt(measurements.variance + amplitude**2 * setting.nugget)
-    noise = stream(setting.seed, _STREAM).standard_normal((len(maps), measurements.count))
-    return Rehearsal(maps, maps @ measurements.weights.T + spread * noise, setting.allowed, amplitude)
+    draw = stream(setting.seed, _STREAM)
+    noise = spread * draw.standard_normal((len(maps), measurements.count))
+    noise += measurements.drift_sd * draw.standard_normal((len(maps), 1))
+    return Rehearsal(maps, maps @ measurements.weights.T + noise, setting.allowed, amplitude)

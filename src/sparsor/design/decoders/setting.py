@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from sparsor.design.decoders.covariance import training_covariance
+from sparsor.design.decoders.noise import Noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -84,11 +85,11 @@ class Setting:
     seed: int
 
     @cached_property
-    def noise(self) -> NDArray[np.float64]:
-        """Noise variances with a floor far below the spread of the values, so that none is 0."""
+    def noise(self) -> Noise:
+        """Noise, its variances with a floor far below the spread of the values, so that none is 0."""
         variance = self.measurements.variance
         scale = float(value_scale(self.measurements.values[None], variance)[0])
-        return np.asarray(np.maximum(variance, (_LEAST_NOISE * scale) ** 2))
+        return Noise(np.maximum(variance, (_LEAST_NOISE * scale) ** 2), self.measurements.drift_sd)
 
     @cached_property
     def training(self) -> NDArray[np.float64]:

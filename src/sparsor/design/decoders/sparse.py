@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.core.streams import stream
+from sparsor.design.decoders.noise import Noise
 from sparsor.design.decoders.setting import Estimate, value_scale
 from sparsor.design.lars import lasso
 from sparsor.errors import DesignError
@@ -56,10 +57,10 @@ class SparseDecoder:
 
     def maps(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the maps and levels of measured values (n, m)."""
-        weight = self._row_weights()
-        level_row = weight * self.sums.sum(axis=1)  # a row of H sums to 1
-        atoms = weight[:, None] * (self.sums @ (self.setting.measurements.weights @ self.dictionary))
-        targets = weight * (values @ self.sums.T)
+        noise = self._noise_of_sums()
+        level_row = noise.whitened(self.sums.sum(axis=1))  # a row of H sums to 1
+        atoms = noise.whitened((self.sums @ (self.setting.measurements.weights @ self.dictionary)).T).T
+        targets = noise.whitened(values @ self.sums.T)
         direction = level_row / np.linalg.norm(level_row)
         contrast_atoms = atoms - np.outer(direction, direction @ atoms)
         contrast = targets - np.outer(targets @ direction, direction)
@@ -99,23 +100,30 @@ class SparseDecoder:
     def _bootstrap(self, maps: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance of maps decoded from fitted values plus residuals drawn with replacement.
 
-        Residuals are drawn on the scale of their noise (Freedman 1981; Chatterjee & Lahiri 2011 for the LASSO).
+        Residuals are drawn on the scale of their noise (Freedman 1981; Chatterjee & Lahiri 2011 for the LASSO); a
+        drift, which all of them share, is taken off before and drawn by itself.
         """
         fitted = maps @ self.setting.measurements.weights.T
         noise = self.setting.measurements.variance
         spread = np.sqrt(noise / noise.mean()) if noise.min() > 0 else np.ones(noise.size)
-        residuals = (values - fitted) / spread
+        residuals = values - fitted
+        residuals = (residuals - self.setting.noise.drift_in(residuals)) / spread
         residuals -= residuals.mean(axis=1, keepdims=True)
         count = max(_MOST_REPLICATES // len(values), _LEAST_REPLICATES)
-        drawn = stream(self.setting.seed, _STREAM).integers(0, noise.size, (count, noise.size))
+        draw = stream(self.setting.seed, _STREAM)
+        drawn = draw.integers(0, noise.size, (count, noise.size))
         replicates = fitted + residuals[:, drawn].swapaxes(0, 1) * spread  # replicates x n x m
+        replicates += draw.standard_normal((count, 1, 1)) * self.setting.measurements.drift_sd
         again, _ = self.maps(replicates.reshape(-1, noise.size))
         return np.asarray(again.reshape(count, *maps.shape).var(axis=0, ddof=1))
 
-    def _row_weights(self) -> NDArray[np.float64]:
-        """Return the square roots of the rows' relative precision; ones where some reading has no noise."""
-        noise = np.square(self.sums) @ self.setting.measurements.variance
-        return np.sqrt(noise.mean() / noise) if noise.min() > 0 else np.ones(noise.size)
+    def _noise_of_sums(self) -> Noise:
+        """Return the noise of the decoded rows, of mean variance 1; all alike where some reading has none."""
+        noise = self.setting.noise
+        variance = np.square(self.sums) @ noise.variance
+        scale = variance.mean()
+        without = self.setting.measurements.variance.min() == 0
+        return Noise(np.ones_like(variance) if without else variance / scale, self.sums @ noise.drift / np.sqrt(scale))
 
 
 def sparse_decoder(setting: Setting, rehearsal: Rehearsal, phi: NDArray[np.bool_] | None = None) -> SparseDecoder:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NoReturn, Self
 
 from sparsor.errors import LeftBehindError, LinkFailureError, StoppedError
+from sparsor.link.flights.linkwatch import LinkWatch
 from sparsor.link.flights.modes import flight_modes
-from sparsor.link.flights.orders import ACCEPTED, command_title, order, result_words
+from sparsor.link.flights.orders import ACCEPTED, ARM_DISARM, command_title, disarm, order, result_words
 from sparsor.link.flights.views import Event
 from sparsor.link.flights.watching import KINDS, Tracker
-from sparsor.link.recorder import request_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,13 +23,12 @@ if TYPE_CHECKING:
     from sparsor.mission import MissionPlan
 
 # MAV_CMD.
-RETURN_TO_LAUNCH, SET_MODE, MISSION_START, ARM_DISARM = 20, 176, 300, 400
+RETURN_TO_LAUNCH, SET_MODE, MISSION_START = 20, 176, 300
 CUSTOM_MODE: Final = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 TICK_S: Final = 0.25
 RETRY_S: Final = 1.0
 UNDER_WAY_S: Final = 20.0  # from an accepted start to leaving the ground
-QUIET_S: Final = 4.0  # a link without a word for so long is told of; heartbeats come once a second
-NO_POSITION_S: Final = 5.0  # then the positions are asked for again: the request may have been lost
+FLIES_ON: Final = "flies on by itself"  # what a vehicle does that is not watched any more
 SETTLE_S: Final = 1.5  # what is still on its way when the vehicle disarms
 
 
@@ -93,8 +92,7 @@ class Flight:
         self._connection, self._vehicle, self._told, self._seen = connection, vehicle, told, seen
         self._tracker = Tracker(plan, vehicle, samples, self._modes.mission)
         self._warnings: dict[str, None] = {}
-        self._quiet = False
-        self._position_s = time.monotonic()
+        self._link = LinkWatch(connection, vehicle)
         self._inbox = connection.inbox(*KINDS, system_id=vehicle.system_id)
 
     def __enter__(self) -> Self:
@@ -123,7 +121,7 @@ class Flight:
         deadline_s = time.monotonic() + ready_timeout_s
         told: str | None = None
         try:
-            request_streams(self._connection, self._vehicle)
+            self._link.insist()
             under_way = self._tracker.flown
             while not under_way:
                 refusal = self._attempt()
@@ -140,12 +138,14 @@ class Flight:
             state = "state unknown, it may take off by itself"
             raise LeftBehindError(f"{error}, while it was started. The vehicle: {state}", state) from error
         except KeyboardInterrupt:
-            if self._tracker.flown or not self._disarmed():
+            if self._tracker.flown or not disarm(self._connection, self._vehicle):
                 raise
             raise StoppedError("interrupted before take-off. The vehicle: disarmed", "disarmed") from None
 
     def watch(self, lost_timeout_s: float) -> FlightResult:
         """Follow the flight until the vehicle is disarmed; can be called again after a Ctrl-C.
+
+        A vehicle that never left the ground has ended its flight as soon as it is disarmed.
 
         Raises
         ------
@@ -153,15 +153,12 @@ class Flight:
             When nothing is heard of the vehicle for `lost_timeout_s` seconds, or the link is gone.
         """
         try:
-            while not self._tracker.ended:
-                self._listen(time.monotonic() + TICK_S)
-                self._check_link(lost_timeout_s)
+            while not self._tracker.ended and (self._tracker.flown or self._tracker.armed):
+                self._listen(time.monotonic() + TICK_S, lost_timeout_s)
                 self._seen(self._tracker.view())
             self._listen(time.monotonic() + SETTLE_S)
         except LinkFailureError as error:
-            raise LeftBehindError(
-                f"{error}. The vehicle flies on by itself; record again with 'sparsor record'", "flies on by itself"
-            ) from error
+            raise LeftBehindError(f"{error}. The vehicle: flies on by itself", FLIES_ON) from error
         return self._result()
 
     def return_home(self) -> None:
@@ -188,11 +185,13 @@ class Flight:
         return None
 
     def _wait(self, seconds: float) -> bool:
-        """Listen for so long, or until the vehicle is under way; return whether it is."""
-        end_s = time.monotonic() + seconds
+        """Listen for so long, or until the vehicle is under way or disarmed itself; return whether it is under way."""
+        end_s, armed = time.monotonic() + seconds, self._tracker.armed
         while not self._tracker.flown and (now_s := time.monotonic()) < end_s:
             self._listen(min(now_s + TICK_S, end_s))
-            self._check_link(None)
+            if armed and not self._tracker.armed:
+                break
+            armed = self._tracker.armed
         return self._tracker.flown
 
     def _its_words(self) -> str:
@@ -202,39 +201,22 @@ class Flight:
     def _give_up(self, refusal: str | None, ready_timeout_s: float) -> NoReturn:
         words = self._its_words()
         why = refusal or "it accepted the start and stays where it is"
-        state = "disarmed, it holds the plan" if self._disarmed() else "armed on the ground, it holds the plan"
+        disarmed = disarm(self._connection, self._vehicle)
+        state = f"{'disarmed' if disarmed else 'armed on the ground'}, it holds the plan"
         raise LeftBehindError(
             f"the mission did not start within {ready_timeout_s:g} s: {why}{words}. The vehicle: {state}", state
         )
 
-    def _disarmed(self) -> bool:
-        """Disarm it; a vehicle in the air refuses that."""
-        try:
-            return order(self._connection, self._vehicle, ARM_DISARM, 0.0) == ACCEPTED
-        except LinkFailureError:
-            return False
-
-    def _listen(self, deadline_s: float) -> None:
+    def _listen(self, deadline_s: float, lost_timeout_s: float | None = None) -> None:
         for received in self._inbox.until(deadline_s):
-            if received.kind == "GLOBAL_POSITION_INT":
-                self._position_s = received.time_s
+            self._link.heard(received)
             for event in self._tracker.take(received):
                 self._tell(event)
             if time.monotonic() > deadline_s:  # there may be more than can be taken in that time
-                return
-
-    def _check_link(self, lost_timeout_s: float | None) -> None:
-        silent_s = self._connection.silent_s(self._vehicle.system_id)
-        if lost_timeout_s is not None and silent_s > lost_timeout_s:
-            raise LinkFailureError(f"the link was lost: nothing was heard of the vehicle for {silent_s:.0f} s")
-        if (silent_s > QUIET_S) != self._quiet:
-            self._quiet = not self._quiet
-            meanwhile = ": the vehicle flies on by itself" if self._tracker.flown else ""
-            lost = Event(f"nothing was heard for {silent_s:.0f} s{meanwhile}", warning=True)
-            self._tell(lost if self._quiet else Event("the vehicle is heard again"))
-        if not self._quiet and time.monotonic() - self._position_s > NO_POSITION_S:
-            self._position_s = time.monotonic()
-            request_streams(self._connection, self._vehicle)
+                break
+        change = self._link.check(lost_timeout_s, flying=self._tracker.flown)
+        if change is not None:
+            self._tell(change)
 
     def _tell(self, event: Event) -> None:
         if event.warning:

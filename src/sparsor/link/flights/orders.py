@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING, Final
 
 from sparsor.errors import LinkFailureError
 from sparsor.link.connection import OUR_SYSTEM
+from sparsor.link.vehicles import vehicle_of
 
 if TYPE_CHECKING:
     from sparsor.link.connection import Connection
-    from sparsor.link.inbox import Message
+    from sparsor.link.inbox import Inbox, Message
     from sparsor.link.vehicles import FoundVehicle
 
 ANSWER_S: Final = 1.5
 TRIES: Final = 10
 WORKING_S: Final = 10.0  # after MAV_RESULT_IN_PROGRESS
+BEAT_S: Final = 2.5  # within which a heartbeat has to come
 PARAMETERS: Final = 7
+ARM_DISARM: Final = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 # MAV_RESULT.
 ACCEPTED, IN_PROGRESS = 0, 5
 
@@ -48,6 +51,32 @@ def order(connection: Connection, vehicle: FoundVehicle, command: int, *params: 
                     return int(answer.message.result)
                 deadline_s = time.monotonic() + WORKING_S
     raise LinkFailureError(f"{vehicle.words} does not answer the command {command_title(command)}")
+
+
+def disarm(connection: Connection, vehicle: FoundVehicle, tries: int = 3) -> bool:
+    """Disarm a vehicle; return whether its heartbeat says that it is.
+
+    A vehicle in the air refuses. An acceptance alone proves nothing: it may answer an earlier order to arm.
+    """
+    try:
+        with connection.inbox("HEARTBEAT", system_id=vehicle.system_id) as beats:
+            for _ in range(tries):
+                if order(connection, vehicle, ARM_DISARM, 0.0) != ACCEPTED:
+                    return False
+                if _armed_after(time.monotonic(), beats, vehicle) is False:
+                    return True
+    except LinkFailureError:
+        pass
+    return False
+
+
+def _armed_after(moment_s: float, beats: Inbox, vehicle: FoundVehicle) -> bool | None:
+    """Return whether a vehicle's first heartbeat after a moment says that it is armed; None when none comes."""
+    for beat in beats.until(moment_s + BEAT_S):
+        found = vehicle_of(beat)
+        if found is not None and found.component_id == vehicle.component_id and beat.time_s >= moment_s:
+            return found.armed
+    return None
 
 
 def command_title(command: int) -> str:

@@ -46,6 +46,15 @@ class Route:
         landing_s = landing_seconds(load_vehicle("quad"), max(height_m, 0.0)) if lands else 0.0
         return left_m / self._speed_m_s(item) + sum(one.hold_s for one in rest) + landing_s
 
+    def home_m(self, lon_deg: float, lat_deg: float) -> float:
+        """Return the straight way from a place to home, metres."""
+        home = self._plan.home
+        return float(distance_m(lon_deg, lat_deg, [home.lon_deg], [home.lat_deg])[0])
+
+    def home_s(self, item: int, home_m: float, height_m: float) -> float:
+        """Return how long the way home takes from item `item`, with the landing, seconds."""
+        return home_m / self._speed_m_s(item) + landing_seconds(load_vehicle("quad"), max(height_m, 0.0))
+
     def _speed_m_s(self, item: int) -> float:
         asked = [one.params[1] for one in self._plan.items[: item + 1] if one.command == DO_CHANGE_SPEED]
         return next((speed for speed in reversed(asked) if speed > 0), max(self._plan.hover_m_s, 1.0))

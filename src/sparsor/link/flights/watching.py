@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sparsor.geodesy.lengths import distance_m
+from sparsor.link.flights.ground import Ground
 from sparsor.link.flights.modes import mode_title
+from sparsor.link.flights.reached import Reached
 from sparsor.link.flights.route import Route
 from sparsor.link.flights.statustexts import StatusTexts
 from sparsor.link.flights.views import Event, Fix, View
 from sparsor.link.vehicles import vehicle_of
-from sparsor.mission.items import WAYPOINTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,16 +27,10 @@ KINDS: Final = (
     "HEARTBEAT", "GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE", "SYS_STATUS", "MISSION_CURRENT", "MISSION_ITEM_REACHED",
     "STATUSTEXT",
 )  # fmt: skip
-# MAV_LANDED_STATE.
-ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
-FLYING: Final = frozenset({IN_AIR, TAKING_OFF, LANDING})
-OFF_GROUND_M: Final = 1.0
-MOVING_M_S: Final = 1.0
-FALL_M_S: Final = 4.0  # no autopilot lands so fast
-FALL_S: Final = 5.0
+RETURNING: Final = frozenset({"RTL", "SMART_RTL", "AUTO_RTL", "QRTL"})  # modes, as pymavlink names them
 NO_SAMPLE_S: Final = 10.0
 BATTERY_LOW: Final = 20
-NEAR_M: Final = 15.0  # how near a waypoint was passed whose MISSION_ITEM_REACHED the link may have lost
+STANDS_S: Final = 30.0  # some vehicles stay armed: rovers, and what DISARM_DELAY or COM_DISARM_LAND says so of
 
 
 class Tracker:
@@ -68,15 +63,12 @@ class Tracker:
         facts = vehicle.autopilot
         self._first = 1 if facts is not None and facts.home_is_item_0 else 0
         self._current = 0
-        self._told_reached: set[int] = set()
-        self._left_behind: set[int] = set()
-        self._track: list[Fix] = []
+        self._reached = Reached(plan)
+        self._ground = Ground()
         self._flown_m = 0.0
         self._begun_s = self._ended_s = 0.0
-        self._landed_state = 0
-        self._fell_s: float | None = None
         self._battery: int | None = None
-        self._low_said = self._silence_said = False
+        self._low_said = self._silence_said = self._stands_said = False
         self._handlers: dict[str, Callable[[Message], list[Event]]] = {
             "GLOBAL_POSITION_INT": self._position,
             "EXTENDED_SYS_STATE": self._extended_state,
@@ -97,23 +89,17 @@ class Tracker:
     @property
     def waypoints(self) -> tuple[int, ...]:
         """Places of the waypoints among the plan's items."""
-        return tuple(place for place, item in enumerate(self._plan.items) if item.command in WAYPOINTS)
+        return self._reached.waypoints
 
     @property
     def reached(self) -> frozenset[int]:
-        """Places of the items that were reached.
-
-        The vehicle said so; or its mission went on past a waypoint near which it was (the link may have lost the word).
-        """
-        return frozenset(self._told_reached | {place for place in self._left_behind if self._was_near(place)})
+        """Places of the items that were reached (`Reached.places`)."""
+        return self._reached.places
 
     @property
     def on_ground(self) -> bool:
         """Whether it is on the ground, as far as it tells."""
-        if self._fell_s is not None and self._now_s - self._fell_s < FALL_S:
-            return False  # a copter that is disarmed in the air calls itself landed (ArduPilot)
-        low = self.last_fix is not None and self.last_fix.height_m < OFF_GROUND_M
-        return self._landed_state == ON_GROUND or low
+        return self._ground.is_under
 
     @property
     def seconds(self) -> float:
@@ -128,22 +114,30 @@ class Tracker:
     def view(self) -> View:
         """Return the flight as it is now."""
         fix, last = self.last_fix, self._samples.last
-        left_m = None if fix is None else self._route.left_m(self._current, fix.lon_deg, fix.lat_deg)
+        left_m, left_s = (None, None) if fix is None else self._left(fix)
         return View(
             item=min(self._current + 1, len(self._plan.items)),
             items=len(self._plan.items),
             mode=self.mode,
             flown_m=self._flown_m,
             left_m=left_m,
-            left_s=None if left_m is None or fix is None else self._route.left_s(self._current, left_m, fix.height_m),
+            left_s=left_s,
             height_m=None if fix is None else fix.height_m,
             ground_speed_m_s=None if fix is None else fix.ground_speed_m_s,
             battery_percent=self._battery,
             samples=self._samples.total,
-            sample=None if last is None else f"{last.name} {last.value:g}",
+            sample=None if last is None else f"{last.name} {_rounded(last.value)}",
             sample_age_s=self._samples.age_s,
             sample_rate_hz=self._samples.rate_hz,
         )
+
+    def _left(self, fix: Fix) -> tuple[float, float]:
+        """Return what is left of the mission, or of the way home where it returns: metres and seconds."""
+        if self.mode in RETURNING:
+            home_m = self._route.home_m(fix.lon_deg, fix.lat_deg)
+            return home_m, self._route.home_s(self._current, home_m, fix.height_m)
+        left_m = self._route.left_m(self._current, fix.lon_deg, fix.lat_deg)
+        return left_m, self._route.left_s(self._current, left_m, fix.height_m)
 
     @property
     def _now_s(self) -> float:
@@ -156,6 +150,8 @@ class Tracker:
             events.append(Event(f"mode {mode}"))
             self.mode = mode
         if armed != self.armed:
+            if not armed and self._ground.disarmed():
+                events.append(Event("landed"))
             events.append(Event("armed" if armed else "disarmed"))
             self.armed = armed
             if self.flown and not armed:
@@ -170,19 +166,17 @@ class Tracker:
             message.time_boot_ms / 1000, message.lon / 1e7, message.lat / 1e7, message.relative_alt / 1000, speed_m_s
         )
         before, self.last_fix = self.last_fix, fix
-        if message.vz > FALL_M_S * 100:
-            self._fell_s = fix.time_s
+        self._ground.take(fix, message.vz / 100, armed=self.armed, done=self._reached.all_behind)
         if not self.armed:
             return []
-        if fix.height_m >= OFF_GROUND_M or speed_m_s >= MOVING_M_S:
-            self._under_way()
+        self._under_way()
         if before is not None and self.flown:
             self._flown_m += float(distance_m(before.lon_deg, before.lat_deg, [fix.lon_deg], [fix.lat_deg])[0])
-        self._track.append(fix)
-        return self._sample_silence()
+        self._reached.fly_over(fix)
+        return [*self._sample_silence(), *self._stands_armed()]
 
     def _under_way(self) -> None:
-        if self.armed and not self.flown:
+        if self.armed and not self.flown and self._ground.is_left:
             self.flown, self._begun_s = True, self._now_s
 
     def _sample_silence(self) -> list[Event]:
@@ -197,11 +191,16 @@ class Tracker:
             return [Event("samples come again")]
         return [Event(f"no sample for {age_s:.0f} s" if self._samples.last else "no sample came yet", warning=True)]
 
+    def _stands_armed(self) -> list[Event]:
+        """Say once that it is down and keeps its motors armed: the flight is watched until they are not."""
+        if self._stands_said or not self.flown or self._ground.stands_s < STANDS_S:
+            return []
+        self._stands_said = True
+        return [Event("it stands still and stays armed: disarm it, or end the recording with Ctrl-C", warning=True)]
+
     def _extended_state(self, message: Message) -> list[Event]:
-        before, self._landed_state = self._landed_state, int(message.landed_state)
-        if self._landed_state in FLYING:
-            self._under_way()
-        landed = self._landed_state == ON_GROUND and before in FLYING
+        landed = self._ground.says(int(message.landed_state))
+        self._under_way()
         return [Event("landed")] if landed else []
 
     def _system_status(self, message: Message) -> list[Event]:
@@ -215,23 +214,19 @@ class Tracker:
     def _mission_current(self, message: Message) -> list[Event]:
         place = max(int(message.seq) - self._first, 0)
         if self.flown and self.mode == self._mission_mode and place > self._current:
-            self._left_behind |= set(range(self._current, min(place, len(self._plan.items)))) & set(self.waypoints)
+            self._reached.leave(self._current, place)
         self._current = place
         return []
 
     def _item_reached(self, message: Message) -> list[Event]:
         place = int(message.seq) - self._first
-        if not 0 <= place < len(self._plan.items) or place in self._told_reached:
-            return []
-        self._told_reached.add(place)
-        return [Event(f"item {place + 1} of {len(self._plan.items)} reached")]
+        news = self._reached.tell(place)
+        return [Event(f"item {place + 1} of {len(self._plan.items)} reached")] if news else []
 
     def _statustext(self, message: Message) -> list[Event]:
         said = self.statustexts.take(message)
         return [] if said is None else [Event(f"the vehicle says: {said.text}", said.serious, not said.serious)]
 
-    def _was_near(self, place: int) -> bool:
-        item = self._plan.items[place]
-        lon = np.array([fix.lon_deg for fix in self._track])
-        lat = np.array([fix.lat_deg for fix in self._track])
-        return bool(len(lon)) and float(distance_m(item.lon_deg, item.lat_deg, lon, lat).min()) <= NEAR_M
+
+def _rounded(value: float) -> str:
+    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.3g}"

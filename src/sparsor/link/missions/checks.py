@@ -40,7 +40,7 @@ def check_plan(plan: MissionPlan, vehicle: FoundVehicle, *, force: bool = False)
         raise LinkError(f"{vehicle.words}: plans can be sent to ArduPilot and PX4 only")
     if plan.firmware_type not in (GENERIC, vehicle.firmware_type):
         raise LinkError(
-            f"the plan is for {plan.autopilot_title}, the vehicle is an {vehicle.words}. Make the plan again with "
+            f"the plan is for {plan.autopilot_title}, the vehicle is {vehicle.words}. Make the plan again with "
             f"--autopilot {vehicle.autopilot.name}"
         )
     if vehicle.armed and not force:
@@ -66,7 +66,7 @@ def far_from_home(plan: MissionPlan, vehicle: FoundVehicle, connection: Connecti
     LinkFailureError
         When the link is gone.
     """
-    place = _position(vehicle, connection)
+    place = position_of(vehicle, connection)
     if place is None:
         return ("The vehicle does not say where it is: whether home is near could not be checked.",)
     away_m = float(distance_m(plan.home.lon_deg, plan.home.lat_deg, [place[0]], [place[1]])[0])
@@ -83,8 +83,14 @@ def above_the_fence(plan: MissionPlan, ceiling_m: float | None) -> tuple[str, ..
     return (f"The highest waypoint is {max(heights):g} m above home, the vehicle's altitude fence at {ceiling_m:g} m.",)
 
 
-def _position(vehicle: FoundVehicle, connection: Connection) -> tuple[float, float] | None:
-    """Ask for GLOBAL_POSITION_INT (MAV_CMD_REQUEST_MESSAGE); degrees, None when no place comes."""
+def position_of(vehicle: FoundVehicle, connection: Connection) -> tuple[float, float] | None:
+    """Ask where a vehicle is; return longitude and latitude in degrees, None when it does not say.
+
+    Raises
+    ------
+    LinkFailureError
+        When the link is gone.
+    """
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
     asked = command_long(vehicle, mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)

@@ -117,13 +117,6 @@ class MavsdkMissions:
         self._wait(f"reading its {KINDS[kind]}", start, allowed=("NO_MISSION_AVAILABLE",))
         return tuple(map(wire_item, held))
 
-    def set_current(self, item: int) -> None:
-        """Make an item the next to be flown."""
-        self._wait(
-            f"setting the current item to {item}",
-            lambda done: self._plugin.set_current_mission_item_async(item, lambda result, _: done(result)),
-        )
-
     def cancel(self) -> None:
         """Give up an upload that runs."""
         with suppress(Exception):  # mavsdk raises when none runs

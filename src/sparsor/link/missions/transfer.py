@@ -117,16 +117,14 @@ class Transfer:
         self._resender.clear(kind)
 
     def set_current(self, item: int) -> None:
-        """Make an item the next to be flown.
+        """Make an item the next to be flown (mavsdk takes a MISSION_CURRENT that was sent before for a refusal).
 
         Raises
         ------
         LinkFailureError
             When the vehicle does not accept it.
         """
-        self._either(
-            "current item", lambda missions: missions.set_current(item), lambda: self._resender.set_current(item)
-        )
+        self._resender.set_current(item)
 
     def cancel(self) -> None:
         """Give up an upload that mavsdk runs; our own ends with the call."""

@@ -149,7 +149,8 @@ def _enforce(connection: Connection, vehicle: FoundVehicle, fence: FenceOrder) -
     except LinkFailureError as error:
         raise LeftBehindError(f"{error}. The vehicle holds the new plan", NEW_PLAN) from error
     except KeyboardInterrupt as interrupt:
-        raise StoppedError(f"interrupted. {interrupt}. The vehicle holds the new plan", NEW_PLAN) from interrupt
+        fence_now = str(interrupt) or "Its fence may be enforced or not"
+        raise StoppedError(f"interrupted. {fence_now}. The vehicle holds the new plan", NEW_PLAN) from interrupt
 
 
 def _gone(connection: Connection, vehicle: FoundVehicle) -> bool:

@@ -32,7 +32,8 @@ def bound(address: Address, kind: socket.SocketKind) -> socket.socket:
         if error.errno == errno.EADDRINUSE:
             raise LinkError(
                 f"port {address.number} is taken: another program (QGroundControl, MAVProxy?) listens on it. "
-                "Close it, or give another port."
+                f"Close it, or give another port. If that is sparsor simulate, give "
+                f"{address.kind.replace('in', 'out')}://127.0.0.1:{address.number}"
             ) from error
         raise LinkError(
             f"cannot listen on {address.url}: {error.strerror or error}. '{address.place}' has to be an address of "

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from sparsor.link.ports.addresses import Address
 
 BUFFER: Final = 65_536
+SEND_S: Final = 10.0  # a vehicle that takes nothing for so long is gone
 
 
 class TcpOut:
@@ -28,6 +29,7 @@ class TcpOut:
                 f"nobody answers at {address.url}: {error.strerror or error}. Is the autopilot running, "
                 "and is this its port (SITL's is 5760)?"
             ) from error
+        self._socket.settimeout(SEND_S)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def receive(self, timeout_s: float) -> bytes:
@@ -56,7 +58,9 @@ class TcpIn:
         if self._client is None:
             self._listener.settimeout(timeout_s)
             try:
-                self._client = self._listener.accept()[0]
+                client = self._listener.accept()[0]
+                client.settimeout(SEND_S)
+                self._client = client
             except TimeoutError:
                 return b""
             except OSError as error:

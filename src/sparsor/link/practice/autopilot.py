@@ -15,6 +15,7 @@ from sparsor.link.practice.flavour import ARDUPILOT, Flavour
 from sparsor.link.practice.flight import Flight
 from sparsor.link.practice.logserver import REQUESTS, LogServer
 from sparsor.link.practice.messages import boot_ms, heartbeat, mission_current
+from sparsor.link.practice.narrator import Narrator
 from sparsor.link.practice.parameters import Parameters
 from sparsor.link.practice.sensor import PracticeSensor, SensorSettings, Truth
 from sparsor.link.practice.storage import StoredItem
@@ -28,6 +29,7 @@ from sparsor.link.practice.wind import Wind, WindSettings
 from sparsor.vehicle import Vehicle, autopilot_named, load_vehicle
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from sparsor.link.practice.transfer import Transfers
@@ -111,9 +113,11 @@ class PracticeAutopilot:
     Parameters
     ----------
     settings : PracticeSettings
+    told : callable
+        Gets a line for everything that happens to it (`Narrator`).
     """
 
-    def __init__(self, settings: PracticeSettings) -> None:
+    def __init__(self, settings: PracticeSettings, told: Callable[[str], None] = lambda _: None) -> None:
         home, flavour = settings.home, settings.flavour
         lat, lon = round(home.lat_deg * 1e7), round(home.lon_deg * 1e7)
         self.settings = settings
@@ -133,6 +137,7 @@ class PracticeAutopilot:
             settings.troubles,
         )
         self._failsafes = Failsafes(self.flight)
+        self.narrator = Narrator(self.flight, told)
         self.samples: list[Sample] = []
         """What the sensor sent so far."""
         make = Px4Transfers if flavour.is_px4 else ArduPilotTransfers
@@ -209,6 +214,7 @@ class PracticeAutopilot:
             self._steps += 1
             self.flight.step(self._steps * STEP_S - self.flight.time_s)
             self._failsafes.step()
+            self.narrator.step()
             out += self._on_air(self._said() + self._after_step())
         # One a second by either clock: a slowed-down flight still shows that it lives.
         if self.time_s - self._beat_s >= 1.0 or now_s - self._beat_wall_s >= 1.0:

@@ -52,6 +52,7 @@ class Failsafes:
             battery.run_low()
         if not flight.armed:
             return
+        self._low_said, self._critical_said = self._low_said and battery.low, self._critical_said and battery.critical
         if battery.low and not self._low_said:
             self._low_said = True
             if flight.flavour.is_px4:

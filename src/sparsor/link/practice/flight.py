@@ -22,6 +22,7 @@ TEMPORARILY_REJECTED: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 BLIND = (Mode.MANUAL, Mode.LAND)
 # A gust is soon over and is not worth a word.
 BLOWN_FOR_S, WIND_SAID_EVERY_S = 3.0, 30.0
+BATTERY_CHANGE_S = 10.0
 
 
 class Flight(FlightState):
@@ -50,10 +51,17 @@ class Flight(FlightState):
             return TEMPORARILY_REJECTED if self.flavour.is_px4 else FAILED
         if self.armed:
             self.say("Disarming motors")
+            self._disarmed_s = self.time_s
         self.battery.draw = 0.0
         self.armed = self.mission_started = False
         self.motion.rest()
         return ACCEPTED
+
+    @property
+    def blown(self) -> bool:
+        """Whether the wind has been the stronger one for a while."""
+        airborne = self.armed and not self.landed
+        return airborne and self.motion.overpowered and self.time_s - self._blown_since_s >= BLOWN_FOR_S
 
     def set_mode(self, mode: Mode | None) -> int:
         """Change the mode; returns a MAV_RESULT and says why not."""
@@ -121,6 +129,8 @@ class Flight(FlightState):
         self._follow_changes()
         if self.armed:
             self._fly(dt_s)
+        elif self.landed and not self.troubles.keep_battery and self.time_s - self._disarmed_s >= BATTERY_CHANGE_S:
+            self.battery.level = 1.0  # somebody has changed it
         self._keep_position()
 
     def _fly(self, dt_s: float) -> None:

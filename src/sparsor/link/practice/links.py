@@ -179,10 +179,12 @@ def bound(kind: socket.SocketKind, address: Address) -> socket.socket:
             server.listen()
     except OSError as error:
         server.close()
-        name = "UDP" if kind == socket.SOCK_DGRAM else "TCP"
+        name, other = ("UDP", 14560) if kind == socket.SOCK_DGRAM else ("TCP", 5770)
         raise OutputError(
             f"{name} port {address[1]} of {address[0]} cannot be opened ({error.strerror or error}); "
-            "is another program using it? Give another port"
+            "is another program using it? Give another port (sparsor simulate --listen "
+            f"{name.lower()}:{other}), or, when that program waits for vehicles as QGroundControl does on UDP 14550, "
+            "send to it (--send-to udp:127.0.0.1:14550)"
         ) from error
     server.setblocking(False)
     return server

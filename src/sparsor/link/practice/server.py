@@ -193,10 +193,13 @@ class PracticeServer:
         self._made += 1
         self._links[key] = Link(self._made, self.autopilot.settings, send, now_s, stays=stays)
         self.autopilot.join(self._made)
+        if not stays:
+            self.autopilot.narrator.say(f"client {self._made} joined ({_words(key)})")
 
     def _drop(self, key: Key) -> None:
         link = self._links.pop(key)
         self.autopilot.leave(link.number)
+        self.autopilot.narrator.say(f"client {link.number} left")
         if isinstance(key, socket.socket):
             self._selector.unregister(key)
             key.close()
@@ -233,3 +236,13 @@ class PracticeServer:
         server = bound(kind, address)
         self._selector.register(server, selectors.EVENT_READ)
         return server
+
+
+def _words(key: Key) -> str:
+    """Return who is at the other end of a link, as people write it."""
+    tcp = isinstance(key, socket.socket)
+    try:
+        host, port, *_ = key.getpeername() if tcp else key[1]
+    except OSError:  # gone already
+        return "TCP"
+    return f"{'TCP' if tcp else 'UDP'} {host}:{port}"

@@ -70,7 +70,7 @@ class FlightState:
         self.outbox: list[Outgoing] = []
         self.mission_started = False
         self._guided: Aim | None = None
-        self._landed_s = 0.0
+        self._landed_s, self._disarmed_s = 0.0, math.inf
         self._return = Return()
         self._known_mission = store.changes[MISSION]
         self._blown_since_s, self._wind_said_s = 0.0, -math.inf

@@ -105,6 +105,8 @@ class Troubles:
         When the battery falls to what makes the vehicle come home.
     link : LinkTroubles
         All the time, on the ground too.
+    keep_battery : bool
+        Nobody changes the battery: a flight begins with what the one before left.
 
     Raises
     ------
@@ -117,6 +119,7 @@ class Troubles:
     link_loss: tuple[Window, ...] = ()
     low_battery_s: float | None = None
     link: LinkTroubles = LinkTroubles()
+    keep_battery: bool = False
 
     def __post_init__(self) -> None:
         if self.low_battery_s is not None and not 0 <= self.low_battery_s < math.inf:

@@ -25,8 +25,9 @@ class Columns:
 
     Parameters
     ----------
-    values : sequence of str
-        `COLUMN` or `NAME=COLUMN`; a column is its number, from 1, or its name in the first line.
+    values : sequence of str, optional
+        `COLUMN` or `NAME=COLUMN`; a column is its number, from 1, or its name in the first line. None: the first
+        column, unless the first line names several.
     name : str
         Of a value that is given no other.
     time : str, optional
@@ -38,7 +39,7 @@ class Columns:
     Raises
     ------
     InputError
-        When a name is not one, two values have the same, or a column cannot be meant.
+        When a name is not one, two values have the same, a column cannot be meant, or nothing says which is.
 
     Examples
     --------
@@ -48,18 +49,21 @@ class Columns:
 
     def __init__(
         self,
-        values: Sequence[str] = ("1",),
+        values: Sequence[str] | None = None,
         *,
         name: str = "NO2",
         time: str | None = None,
         delimiter: str = "comma",
         time_unit: str = "s",
     ) -> None:
-        pairs = [value.rpartition("=") for value in values]
+        self._chosen = bool(values)
+        pairs = [value.rpartition("=") for value in values or ("1",)]
         self._names = checked_names(given if found else name for given, found, _ in pairs)
         self._wanted = [column for *_, column in pairs]
         self._time = time
         self._second = second_of(time_unit)
+        if time == "1" and not values:
+            raise InputError("column 1 is the time: say which column is the value (--value COLUMN)")
         self._delimiter = DELIMITERS.get(delimiter, delimiter)
         if len(self._delimiter) != 1 or self._delimiter in '"\r\n':
             raise InputError(f"the delimiter '{delimiter}'; give one character, or one of {', '.join(DELIMITERS)}")
@@ -74,6 +78,8 @@ class Columns:
         """Return what a line says; None for the header; InputError when the header lacks a column."""
         cells = self._cells(line)
         first, self._begun = not self._begun, True
+        if first and not self._chosen:
+            _refuse_names(cells)
         if first and self.needs_header:
             self._find({cell: place for place, cell in enumerate(cells)})
             return None
@@ -164,6 +170,23 @@ class Pattern:
             names[self._groups.index(VALUE_GROUP)] = name
         time_s = time_of(match[TIME_GROUP], self._second) if self.has_time else None
         return reading_of([(name, match[group]) for name, group in zip(names, self._groups, strict=True)], time_s)
+
+
+def _refuse_names(cells: Sequence[str]) -> None:
+    """Refuse a first line that names several columns, when nobody said which of them is the value."""
+    if len(cells) > 1 and not any(_is_number(cell) for cell in cells):
+        raise InputError(
+            f"the first line names {len(cells)} columns: {', '.join(cells)}. Say which are to be sent, e.g. --value "
+            f"NO2={cells[-1]}"
+        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _cell_or_none(cells: Sequence[str], place: int) -> str | None:

@@ -131,7 +131,7 @@ class Outlet:
                 self._up.set()
                 self._watch(self._connection)
             except (LinkError, LinkFailureError) as error:
-                if self.refusal is None and not said:
+                if self.refusal is None and not said and not self._stop.is_set():
                     self._say(f"{error} (trying again)")
                     said = True
             finally:

@@ -40,16 +40,16 @@ class ReplayedFile:
     live, waits = False, True
 
     def __init__(self, path: Path, form: LineFormat, *, speed: float = 1.0, rate_hz: float | None = None) -> None:
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeError) as error:
+            raise InputError(f"cannot read '{path}': {getattr(error, 'strerror', None) or error}") from error
         if not (form.has_time or rate_hz):
             raise InputError(
                 f"'{path}' is sent as it was recorded: say which column is the time, or how many lines a second"
             )
         if not 0 < speed < float("inf"):
             raise InputError(f"a replay speed of {speed:g}; it has to be above 0")
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-        except (OSError, UnicodeError) as error:
-            raise InputError(f"cannot read '{path}': {getattr(error, 'strerror', None) or error}") from error
         self._speed = speed
         self._rows = [(line, read_line(form, line)) for line in text.splitlines() if line.strip()]
         self._interval_s = None if form.has_time else 1 / (rate_hz or 1)

@@ -90,6 +90,7 @@ def download(
     *,
     number: int | None = None,
     every: bool = False,
+    into_folder: bool = False,
     system_id: int | None = None,
     timeout_s: float = 30.0,
     replace: bool = False,
@@ -107,7 +108,9 @@ def download(
     number : int or None
         Which log, by the vehicle's number; None for the last one.
     every : bool
-        Fetch all of them; `output` is a folder then, made when it is missing.
+        Fetch all of them; `output` is a folder then.
+    into_folder : bool
+        `output` is a folder, made when it is missing.
     system_id : int or None
         Which vehicle; None for the only one there is.
     timeout_s : float
@@ -127,11 +130,12 @@ def download(
     OutputError
         When a file cannot be written.
     """
-    if not every and not output.is_dir():
+    into_folder = into_folder or every
+    if not into_folder and not output.is_dir():
         _check_free(output, replace=replace)
     with _logs_of(url, system_id, timeout_s, warn=warn) as (vehicle, client):
         entries = _chosen(client.entries(), number, every=every, vehicle=vehicle)
-        if every:
+        if into_folder:
             _make(output)
         files = [output / entry.file_name(vehicle) if output.is_dir() else output for entry in entries]
         for file in files:

@@ -1,0 +1,121 @@
+"""Which samples of a log belong to the mission: at its height, and inside its grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sparsor.errors import LogError
+from sparsor.geodesy.lengths import distance_m
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sparsor.flightlog.sampling import Samples
+    from sparsor.geodesy.grid import Grid
+
+BAND: Final = 0.2
+"""Half the height of the band around the mission's height, as a share of that height."""
+LEAST_BAND_M: Final = 2.0
+OUTSIDE = -1
+_MODE_WIDTH_M = 4.0
+_AIRBORNE = 0.5  # above this share of the usual height nothing takes off or lands
+
+
+@dataclass(frozen=True, eq=False)
+class MissionPart:
+    """Where samples lie, and which were taken on the mission.
+
+    Parameters
+    ----------
+    in_flight : array of bool (n,)
+        At the mission's height.
+    cell : array of int64 (n,)
+        `OUTSIDE` for those outside the grid.
+    warnings : tuple of str
+    """
+
+    in_flight: NDArray[np.bool_]
+    cell: NDArray[np.int64]
+    warnings: tuple[str, ...]
+
+
+def mission_part(samples: Samples, grid: Grid, altitude_m: float | None = None) -> MissionPart:
+    """Tell the mission from the way to it, take-off and landing.
+
+    Samples of unknown height count as of the mission's. A vehicle that stays on the ground is on its mission
+    all the time.
+
+    Parameters
+    ----------
+    samples : Samples
+    grid : Grid
+    altitude_m : float, optional
+        The mission's height above home. Without it, or where nothing was flown at it, all above half of the height
+        that was flown most counts. Where only altitudes above the sea are known, nobody knows how high home is: what
+        was flown most is taken for the mission's height.
+
+    Raises
+    ------
+    LogError
+        When no sample lies inside the grid; says how far away the nearest is.
+    """
+    cell = grid.cell_at(samples.lon_deg, samples.lat_deg)
+    inside = cell != OUTSIDE
+    if not inside.any():
+        raise LogError(_elsewhere(samples, grid))
+    from_home = bool(np.isfinite(samples.height_m).any())
+    height_m = samples.height_m if from_home else _above_ground_m(samples.alt_m)
+    unknown = np.isnan(height_m)
+    if unknown.all():
+        return MissionPart(np.ones(cell.size, dtype=np.bool_), cell, ())
+    usual_m = _mode(height_m[~unknown])
+    airborne = unknown | (height_m >= _AIRBORNE * usual_m) | (usual_m < LEAST_BAND_M)
+    if altitude_m is None:
+        return MissionPart(airborne, cell, ())
+    half_m = max(BAND * altitude_m, LEAST_BAND_M)
+    in_band = unknown | (np.abs(height_m - (altitude_m if from_home else usual_m)) <= half_m)
+    if 2 * (in_band & inside).sum() >= (airborne & inside).sum():
+        return MissionPart(in_band, cell, ())
+    warning = (
+        f"the mission was planned at {altitude_m:g} m above home, but most of it was flown at about {usual_m:.0f} m: "
+        "all samples above half of that height were taken"
+    )
+    return MissionPart(airborne, cell, (warning,))
+
+
+def missed_stops(stops: NDArray[np.int64], visited: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the planned cells in which nothing was measured, in flight order."""
+    return stops[~np.isin(stops, visited)]
+
+
+def _above_ground_m(alt_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return heights above the lowest place, where only altitudes above the sea are known."""
+    known = alt_m[np.isfinite(alt_m)]
+    return alt_m - (known.min() if known.size else 0.0)
+
+
+def _mode(height_m: NDArray[np.float64]) -> float:
+    """Return the height around which most samples above the ground lie."""
+    ordered = np.sort(height_m)
+    above = ordered[ordered > LEAST_BAND_M]
+    if above.size == 0:
+        return float(ordered[-1])
+    inside = np.searchsorted(above, above + _MODE_WIDTH_M, side="right") - np.arange(above.size)
+    first = int(np.argmax(inside))
+    return float(np.median(above[first : first + inside[first]]))
+
+
+def _elsewhere(samples: Samples, grid: Grid) -> str:
+    if samples.lon_deg.size == 0:
+        return "the log holds no sample with a position; record the vehicle's position and the sensor together"
+    lon, lat = grid.centres_deg(grid.size // 2 + grid.shape[1] // 2)
+    metres = distance_m(samples.lon_deg, samples.lat_deg, lon, lat)
+    near = int(np.argmin(metres))
+    return (
+        f"none of the {samples.lon_deg.size} samples lies in the mission's box {grid.box.as_tuple()}: the nearest is "
+        f"at {samples.lon_deg[near]:.5f} {samples.lat_deg[near]:.5f}, {metres[near] / 1000:.1f} km from its middle; "
+        "give the mission that was flown"
+    )

@@ -1,0 +1,94 @@
+"""A file's bytes block by block, unpacked on the way, with progress."""
+
+from __future__ import annotations
+
+import gzip
+import lzma
+import zlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from sparsor.core.progress import silent
+from sparsor.errors import LogError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from io import BufferedIOBase, BufferedReader
+    from pathlib import Path
+
+    from sparsor.core.progress import Progress
+
+BLOCK: Final = 4 << 20
+_GZIP, _XZ = b"\x1f\x8b", b"\xfd7zXZ\x00"
+_BROKEN = (EOFError, gzip.BadGzipFile, lzma.LZMAError, zlib.error)
+
+
+@dataclass(eq=False)
+class LogFile:
+    """A log on the disk, perhaps packed by gzip or xz.
+
+    Parameters
+    ----------
+    path : Path
+    progress : Progress
+
+    Attributes
+    ----------
+    cut_short : bool
+        Whether the packed file broke off; what came before was read.
+    """
+
+    path: Path
+    progress: Progress = silent
+    cut_short: bool = field(default=False, init=False)
+
+    def blocks(self, size: int = BLOCK) -> Iterator[bytes]:
+        """Yield the contents in blocks of at most `size` bytes.
+
+        Raises
+        ------
+        LogError
+            When the file cannot be read.
+        """
+        try:
+            total = self.path.stat().st_size
+            with self.path.open("rb") as raw:
+                for block in self._unpacked(_unpacker(raw), size):
+                    self.progress(f"reading {self.path.name}", min(raw.tell(), total), total)
+                    yield block
+        except OSError as error:
+            raise LogError(f"cannot read '{self.path}': {error.strerror or error}; give a flight log") from error
+
+    def head(self, size: int) -> bytes:
+        """Return the first bytes."""
+        return next(LogFile(self.path).blocks(size), b"")
+
+    def contents(self) -> bytes:
+        """Return all of it, for readers that need it at once."""
+        return b"".join(self.blocks())
+
+    def _unpacked(self, stream: BufferedIOBase, size: int) -> Iterator[bytes]:
+        block = bytearray()
+        while not self.cut_short:
+            try:
+                piece = stream.read1(size - len(block))  # not `read`, which forgets what came before a break
+            except _BROKEN:
+                self.cut_short = True
+                piece = b""
+            if len(piece) == size:  # the whole block at once: nothing to put together
+                yield piece
+                continue
+            block += piece
+            if block and (not piece or len(block) == size):
+                yield bytes(block)
+                block.clear()
+            if not piece:
+                return
+
+
+def _unpacker(raw: BufferedReader) -> BufferedIOBase:
+    head = raw.read(6)
+    raw.seek(0)
+    if head.startswith(_GZIP):
+        return gzip.GzipFile(fileobj=raw)
+    return lzma.LZMAFile(raw) if head == _XZ else raw
