@@ -1,0 +1,1 @@
+"""Routes that minimise the error to expect of the map, searched directly."""
