@@ -2,49 +2,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.design.refined.costs import Costs, used
 from sparsor.design.refined.crossings import crosses
+from sparsor.design.refined.dense import product, solve
 from sparsor.design.refined.flyover import Flyover, fly, response
 from sparsor.design.refined.moves import propose
 from sparsor.design.refined.posterior import Belief, changed, expected_error, posterior
 
 _LEAST_CHANGE = 1e-9
-
-
-class Costs(NamedTuple):
-    """What a route uses of its budget.
-
-    Parameters
-    ----------
-    legs : array of float64 (N, N)
-        Metres, cell widths or seconds.
-    ends : array of float64 (N,)
-        The way between home and each cell.
-    closing : float
-        1 when the way from the last stop to the first counts, 0 otherwise.
-    per_stop, limit : float
-    """
-
-    legs: NDArray[np.float64]
-    ends: NDArray[np.float64]
-    closing: float
-    per_stop: float
-    limit: float
+_MOST_UPDATES = 8  # taking readings away again amplifies rounding: then the posterior is made afresh
 
 
 @njit(cache=True, nogil=True)
-def used(costs: Costs, stops: NDArray[np.int64]) -> float:
-    """Return what a route uses."""
-    first, last = stops[0], stops[-1]
-    total = costs.ends[first] + costs.ends[last] + costs.closing * costs.legs[last, first]
-    for k in range(stops.size - 1):
-        total += costs.legs[stops[k], stops[k + 1]]
-    return total + costs.per_stop * stops.size
+def route_error(prior: Belief, over: Flyover, stops: NDArray[np.int64]) -> float:
+    """Return the expected error of the route over `stops`: the mean posterior variance over the cells that count."""
+    return expected_error(prior, posterior(prior, _shares(over, stops, prior.precision.size)[2]))
 
 
 @njit(cache=True, nogil=True)
@@ -77,16 +53,11 @@ def anneal(
     array of int64, array of int64, float
         The last route, the best one and the best one's expected error.
     """
-    cells = prior.precision.size
     stops = start.copy()
-    passes, seconds = np.zeros(cells, dtype=np.int64), np.zeros(cells)
-    fly(over, stops, 1, passes, seconds)
-    share = np.zeros(cells)
-    touched, difference = _differences(over, passes, seconds, share)
-    share[touched] += difference
+    passes, seconds, share = _shares(over, stops, prior.precision.size)
     covariance = posterior(prior, share)
     error = expected_error(prior, covariance)
-    best, best_error = stops, error
+    best, best_error, updates = stops, error, 0
     for temperature in temperatures:
         trial = propose(stops, prior.precision, over.columns, rng)
         if trial.size < 2 or used(costs, trial) > costs.limit:
@@ -98,9 +69,9 @@ def anneal(
         fly(over, before, -1, passes, seconds)
         fly(over, after, 1, passes, seconds)
         touched, difference = _differences(over, passes, seconds, share)
-        rise = 0.0
+        rise, left, inner = 0.0, covariance, covariance  # for a change of order alone
         if touched.size:
-            rise = changed(prior, covariance, touched, difference)
+            rise, left, inner = changed(prior, covariance, touched, difference)
         if rise > error * np.expm1(-temperature * np.log(1.0 - rng.random())):
             fly(over, after, -1, passes, seconds)
             fly(over, before, 1, passes, seconds)
@@ -109,11 +80,28 @@ def anneal(
         if not touched.size:
             continue
         share[touched] += difference
-        covariance = posterior(prior, share)  # afresh: taking readings away again would amplify rounding
-        error = expected_error(prior, covariance)
+        error += rise
+        updates += 1
+        if error < best_error or updates % _MOST_UPDATES == 0:
+            covariance = posterior(prior, share)
+            error = expected_error(prior, covariance)
+        else:
+            covariance -= product(np.ascontiguousarray(left.T), solve(inner, left))
         if error < best_error:
             best, best_error = stops, error
     return stops, best, best_error
+
+
+@njit(cache=True, nogil=True)
+def _shares(
+    over: Flyover, stops: NDArray[np.int64], cells: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return how often a route passes over each cell, for how long, and the share of its information that gives."""
+    passes, seconds, share = np.zeros(cells, dtype=np.int64), np.zeros(cells), np.zeros(cells)
+    fly(over, stops, 1, passes, seconds)
+    touched, difference = _differences(over, passes, seconds, share)
+    share[touched] += difference
+    return passes, seconds, share
 
 
 @njit(cache=True, nogil=True)

@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.design.refined.dense import gram, inner_products, inverse, product, solve
+
 _LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
 _LEAST_NOISE = 1e-6  # of the map's variance
 
@@ -74,13 +76,15 @@ def belief(
 def posterior(prior: Belief, share: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the covariance of the coefficients after each cell was read with a share of its precision, (r+1, r+1)."""
     cells = np.flatnonzero(share)
-    rows = np.empty((cells.size, prior.spread.size))
-    for i in range(cells.size):
-        rows[i] = prior.factor[cells[i]] * np.sqrt(share[cells[i]] * prior.precision[cells[i]])
-    information = rows.T @ rows
+    readings = np.empty((prior.spread.size, cells.size))
+    for k in range(cells.size):
+        scale = np.sqrt(share[cells[k]] * prior.precision[cells[k]])
+        for j in range(prior.spread.size):
+            readings[j, k] = scale * prior.factor[cells[k], j]
+    information = gram(readings)
     for j in range(prior.spread.size):
         information[j, j] += 1 / prior.spread[j]
-    return np.linalg.inv(information)
+    return inverse(information)
 
 
 @njit(cache=True, nogil=True)
@@ -95,20 +99,17 @@ def expected_error(prior: Belief, covariance: NDArray[np.float64]) -> float:
 @njit(cache=True, nogil=True)
 def changed(
     prior: Belief, covariance: NDArray[np.float64], cells: NDArray[np.int64], difference: NDArray[np.float64]
-) -> float:
-    """Return what a change of the cells' shares does to the expected error, by the Woodbury identity.
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Return what a change of the cells' shares does to the expected error, and the update that makes it.
+
+    By the Woodbury identity the posterior covariance P becomes ``P - left.T @ inv(inner) @ left``.
     """
     rows = np.empty((cells.size, prior.spread.size))
     for i in range(cells.size):
         rows[i] = prior.factor[cells[i]]
-    left = rows @ covariance
-    inner = left @ rows.T
+    left = product(rows, covariance)
+    inner = inner_products(left, rows)
     for i in range(cells.size):
-        weight = difference[i] * prior.precision[cells[i]]
-        inner[i, i] += 1 / weight
-    right = np.linalg.solve(inner, left)
-    error = 0.0
-    for i in range(cells.size):
-        for j in range(prior.size.size):
-            error -= prior.size[j] * left[i, j] * right[i, j]
-    return error
+        inner[i, i] += 1 / (difference[i] * prior.precision[cells[i]])
+    explained = solve(inner, inner_products(left * prior.size, left))
+    return -float(np.trace(explained)), left, inner
