@@ -186,9 +186,7 @@ class _Search:
         routes = [stops for stops in routes if self.fits(stops)]
         if not routes:
             say = self.task.budget.describe
-            raise BudgetError(
-                f"no route of two cells or more within {say(self.costs.limit)}: allow a larger --budget"
-            )
+            raise BudgetError(f"no route of two cells or more within {say(self.costs.limit)}: allow a larger --budget")
         for level, stage in enumerate(_STAGES):
             routes = self.anneal_all(0, level, self.ranked(routes, level)[: stage.chains])
         return self.ranked(routes, len(_STAGES) - 1)[0]
