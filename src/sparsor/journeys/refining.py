@@ -10,7 +10,7 @@ from sparsor.core.workers import one_blas_thread
 from sparsor.design import Candidate
 from sparsor.design.decoders import Measurements
 from sparsor.design.decoders.covariance import training_covariance, unit_shapes
-from sparsor.design.decoders.decode import candidates
+from sparsor.design.decoders.decode import DecoderName, candidates
 from sparsor.design.decoders.setting import Setting
 from sparsor.design.refined import Task, refine
 from sparsor.errors import DesignError
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Of the maps' variance: about 1 % of their range, what a calibrated sensor leaves of noise.
 READING_NOISE = 0.05**2
-_LINEAR = ("kriging", "mmse", "blend")
+_LINEAR: tuple[DecoderName, ...] = ("kriging", "mmse", "blend")
 
 
 def search_refined(

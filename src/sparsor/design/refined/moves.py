@@ -32,20 +32,20 @@ def propose(
     rng : numpy.random.Generator
     """
     trial = stops
-    for _ in range(1 + rng.integers(0, 2) + rng.integers(0, 2)):
-        kind = rng.integers(0, 10)
+    for _ in range(1 + int(rng.integers(0, 2)) + int(rng.integers(0, 2))):
+        kind = int(rng.integers(0, 10))
         reach = _REACHES[rng.integers(0, _REACHES.size)]
-        at = rng.integers(0, trial.size)
+        at = int(rng.integers(0, trial.size))
         if kind < 4:
-            trial = _moved(trial, at, 1 + (kind == 3), reach, open_cells, columns, rng)
+            trial = _moved(trial, at, 2 if kind == 3 else 1, reach, open_cells, columns, rng)
         elif kind < 6:
             trial = _inserted(trial, reach, open_cells, columns, rng)
         elif kind < 8 and trial.size > 2:
             trial = np.concatenate((trial[:at], trial[at + 1 :]))
         elif kind == 8:
-            trial = _turned(trial, at, rng.integers(0, trial.size))
+            trial = _turned(trial, at, int(rng.integers(0, trial.size)))
         elif trial.size > 2:
-            trial = _displaced(trial, at, rng.integers(0, trial.size))
+            trial = _displaced(trial, at, int(rng.integers(0, trial.size)))
     return trial
 
 
@@ -75,7 +75,7 @@ def _inserted(
     stops: NDArray[np.int64], reach: float, open_cells: NDArray[np.float64], columns: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Insert a stop near a point of a leg, or near an end."""
-    at = rng.integers(0, stops.size + 1)  # in front of this position
+    at = int(rng.integers(0, stops.size + 1))  # in front of this position
     before, after = stops[max(at - 1, 0)], stops[min(at, stops.size - 1)]
     along = rng.random()
     row = (1 - along) * (before // columns) + along * (after // columns) + reach * rng.normal()
