@@ -144,7 +144,7 @@ def plan(
     lambda_incoh: Annotated[float | None, _option(SEARCH, "Weight of the incoherence.", "--lambda-incoh")] = None,
     iterations: Annotated[
         int | None,
-        _option(SEARCH, "Monte-Carlo samples (default: 4000), or moves of refined (160000).", "--iterations"),
+        _option(SEARCH, "Monte-Carlo samples (default: 4000), or moves of refined (480000).", "--iterations"),
     ] = None,
     time: Annotated[
         float | None,

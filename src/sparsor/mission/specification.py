@@ -30,7 +30,7 @@ Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
 HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
 PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
 DEFAULT_BUDGET = "10%"
-MONTE_CARLO_SAMPLES, REFINED_MOVES = 4000, 160_000
+MONTE_CARLO_SAMPLES, REFINED_MOVES = 4000, 480_000
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 
 

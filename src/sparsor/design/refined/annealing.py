@@ -8,7 +8,7 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.design.refined.costs import Costs, used
 from sparsor.design.refined.crossings import crosses
-from sparsor.design.refined.dense import product, solve
+from sparsor.design.refined.dense import solve
 from sparsor.design.refined.flyover import Flyover, fly, response
 from sparsor.design.refined.moves import propose
 from sparsor.design.refined.posterior import Belief, changed, expected_error, posterior
@@ -86,7 +86,7 @@ def anneal(
             covariance = posterior(prior, share)
             error = expected_error(prior, covariance)
         else:
-            covariance -= product(np.ascontiguousarray(left.T), solve(inner, left))
+            covariance -= np.dot(np.ascontiguousarray(left.T), solve(inner, left))
         if error < best_error:
             best, best_error = stops, error
     return stops, best, best_error

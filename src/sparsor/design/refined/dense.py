@@ -1,4 +1,8 @@
-"""Small dense linear algebra, compiled: LAPACK called from compiled code would hold the interpreter's lock."""
+"""Small dense linear algebra, compiled.
+
+BLAS and LAPACK hold the interpreter's lock when compiled code calls them. For a product of large matrices that is
+worth it; these are too small or too slow for it, and run side by side.
+"""
 
 from __future__ import annotations
 
@@ -12,24 +16,6 @@ if TYPE_CHECKING:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``a @ b``, row by row."""
-    out = np.zeros((a.shape[0], b.shape[1]))
-    rows = a.shape[0] - a.shape[0] % 2
-    for i in range(0, rows, 2):  # two rows at a time: each row of b is read once for both
-        for k in range(b.shape[0]):
-            first, second = a[i, k], a[i + 1, k]
-            for j in range(b.shape[1]):
-                out[i, j] += first * b[k, j]
-                out[i + 1, j] += second * b[k, j]
-    for i in range(rows, a.shape[0]):
-        for k in range(b.shape[0]):
-            for j in range(b.shape[1]):
-                out[i, j] += a[i, k] * b[k, j]
-    return out
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
 def inner_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ``a @ b.T``."""
     out = np.empty((a.shape[0], b.shape[0]))
@@ -39,20 +25,6 @@ def inner_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np
             for k in range(a.shape[1]):
                 total += a[i, k] * b[j, k]
             out[i, j] = total
-    return out
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def gram(a: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``a @ a.T``."""
-    out = np.empty((a.shape[0], a.shape[0]))
-    for i in range(a.shape[0]):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(a.shape[1]):
-                total += a[i, k] * a[j, k]
-            out[i, j] = total
-            out[j, i] = total
     return out
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
-from sparsor.design.refined.dense import gram, inner_products, inverse, product, solve
+from sparsor.design.refined.dense import inner_products, inverse, solve
 
 _LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
 _LEAST_NOISE = 1e-6  # of the map's variance
@@ -81,7 +81,7 @@ def posterior(prior: Belief, share: NDArray[np.float64]) -> NDArray[np.float64]:
         scale = np.sqrt(share[cells[k]] * prior.precision[cells[k]])
         for j in range(prior.spread.size):
             readings[j, k] = scale * prior.factor[cells[k], j]
-    information = gram(readings)
+    information = np.dot(readings, readings.T)
     for j in range(prior.spread.size):
         information[j, j] += 1 / prior.spread[j]
     return inverse(information)
@@ -107,7 +107,7 @@ def changed(
     rows = np.empty((cells.size, prior.spread.size))
     for i in range(cells.size):
         rows[i] = prior.factor[cells[i]]
-    left = product(rows, covariance)
+    left = np.dot(rows, covariance)
     inner = inner_products(left, rows)
     for i in range(cells.size):
         inner[i, i] += 1 / (difference[i] * prior.precision[cells[i]])

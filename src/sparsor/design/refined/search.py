@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from sparsor.design.budget import Budget
     from sparsor.design.legs import LegTable
 
-DEFAULT_ITERATIONS = 160_000
+DEFAULT_ITERATIONS = 480_000
 _STREAM = 5  # not one of Algorithm 1's, nor of the rehearsal's
 _PIECE = 1000  # moves between two looks at the clock
 LEAST_ITERATIONS = 10
@@ -52,7 +52,7 @@ class _Stage:
 
 
 # Chosen on validation maps; each stage gets half of the moves. See docs/decisions/0012-refined-search.md.
-_STAGES = (_Stage(64, 4, 0.05, 0.005), _Stage(128, 2, 0.005, 0.0003))
+_STAGES = (_Stage(64, 2, 0.1, 0.003), _Stage(128, 2, 0.003, 0.0003))
 
 
 @dataclass(frozen=True)
