@@ -25,6 +25,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from sparsor.core.metrics import relative_error, squared_error
 from sparsor.core.streams import stream
+from sparsor.core.workers import one_blas_thread
 from sparsor.design import Budget, unit_legs
 from sparsor.design.decoders.covariance import contrasts, kernel_covariance, unit_shapes, with_symmetries
 from sparsor.design.refined import DEFAULT_ITERATIONS, Task, refine
@@ -130,8 +131,9 @@ def lawnmower(task, _options):
 
 
 def qr_pivots(task, _options):
-    prior = belief(task.covariance, ALL, rank=128, noise=task.noise)
-    return tour_within(pivots(prior), costs(task.budget, LEGS))
+    with one_blas_thread():
+        prior = belief(task.covariance, ALL, rank=128, noise=task.noise)
+        return tour_within(pivots(prior), costs(task.budget, LEGS))
 
 
 def refined(task, options):
