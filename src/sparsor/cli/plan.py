@@ -93,7 +93,14 @@ def plan(
     model: Annotated[Path | None, _option(PRIOR, "Model made by 'sparsor learn'.", "--model", metavar="FILE")] = None,
     atoms: Annotated[int | None, _option(PRIOR, "Atoms of the dictionary, K (default: 256).", "--atoms")] = None,
     planner: Annotated[
-        str | None, _option(SEARCH, "monte-carlo, the paper's Algorithm 1.", "--planner", metavar="NAME")
+        str | None,
+        _option(
+            SEARCH,
+            "monte-carlo, the paper's Algorithm 1, or refined, the route of least expected error (default: "
+            "monte-carlo).",
+            "--planner",
+            metavar="NAME",
+        ),
     ] = None,
     paper: Annotated[
         bool,
@@ -136,7 +143,10 @@ def plan(
         _option(SEARCH, "Weight of the path length; turns the default budget off.", "--lambda-path"),
     ] = None,
     lambda_incoh: Annotated[float | None, _option(SEARCH, "Weight of the incoherence.", "--lambda-incoh")] = None,
-    iterations: Annotated[int | None, _option(SEARCH, "Monte-Carlo samples (default: 4000).", "--iterations")] = None,
+    iterations: Annotated[
+        int | None,
+        _option(SEARCH, "Monte-Carlo samples (default: 4000), or moves of refined (480000).", "--iterations"),
+    ] = None,
     time: Annotated[
         float | None,
         _option(

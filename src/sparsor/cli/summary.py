@@ -66,7 +66,11 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
         (
             "expected error",
             f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
-            f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells",
+            + (
+                "cells flown over)"
+                if spec.search.planner == "refined"
+                else f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells"
+            ),
         ),
         (
             "prior",
@@ -76,7 +80,7 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
     ]
     if mission.sensor is not None:
         table.append(("sensor", mission.sensor.words))
-    if details:
+    if details and spec.search.planner == "monte-carlo":
         weights = mission.weights
         table += [
             (

@@ -152,3 +152,22 @@ def _crossing(rows: int, columns: int) -> tuple[NDArray[np.int64], NDArray[np.in
         np.floor(middle * columns + 0.5).astype(np.int64),
         np.diff(along),
     )
+
+
+def crossing_table(
+    shape: tuple[int, int],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return the cells under the legs of every offset, one offset after the other, as compiled code needs them.
+
+    Returns
+    -------
+    first : array of int64 (N + 1,)
+        Where the cells of ``down`` rows and ``across`` columns begin: at ``first[down * columns + across]``.
+    rows_off, columns_off : array of int64
+    share : array of float64
+        Of the leg's length in each cell.
+    """
+    parts = [_crossing(*divmod(offset, shape[1])) for offset in range(shape[0] * shape[1])]
+    first = np.concatenate([[0], np.cumsum([part[2].size for part in parts])])
+    rows_off, columns_off, share = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return first, rows_off, columns_off, share

@@ -30,6 +30,7 @@ Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
 HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
 PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
 DEFAULT_BUDGET = "10%"
+MONTE_CARLO_SAMPLES, REFINED_MOVES = 4000, 480_000
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 
 
@@ -80,9 +81,9 @@ class PriorSection(_Section):
 
 
 class SearchSection(_Section):
-    """Algorithm 1's settings; those left out are searched (p, theta) or chosen (lambdas)."""
+    """The search's settings; of Algorithm 1 those left out are searched (p, theta) or chosen (lambdas)."""
 
-    planner: Literal["monte-carlo"] = "monte-carlo"
+    planner: Literal["monte-carlo", "refined"] = "monte-carlo"
     paper: bool = False
     rows: Annotated[int, Field(ge=1, le=1024)] = 35
     probability: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
@@ -91,7 +92,7 @@ class SearchSection(_Section):
     lambda_valid: NotNegative = 1.0
     lambda_path: NotNegative | None = None
     lambda_incoh: NotNegative | None = None
-    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = 4000
+    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = MONTE_CARLO_SAMPLES
     time_s: Positive | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     budget: str | None = None
@@ -100,6 +101,15 @@ class SearchSection(_Section):
     def _theta_within_rows(self) -> Self:
         if self.theta is not None and self.theta > self.rows:
             raise ValueError(f"theta is {self.theta}; it has to be 0..{self.rows}, the number of rows of Phi")
+        return self
+
+    @model_validator(mode="after")
+    def _refined_within_a_budget(self) -> Self:
+        if self.planner == "refined" and (self.paper or self.budget is None):
+            raise ValueError(
+                "the refined planner searches within a budget and knows no lambda_path and no --paper: give a budget, "
+                "like 10%, or take the monte-carlo planner"
+            )
         return self
 
     @field_validator("budget")
@@ -118,6 +128,8 @@ class SearchSection(_Section):
         if not isinstance(given, dict):
             return given
         filled = {key: value for key, value in given.items() if value is not None}
+        if filled.get("planner") == "refined":
+            filled.setdefault("iterations", REFINED_MOVES)
         both = "probability" in filled and "theta" in filled
         no_default = filled.get("paper") or "lambda_path" in filled or both
         if "budget" not in filled and no_default:
@@ -227,6 +239,8 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
         for name, filled in (("probability", PAPER_PROBABILITY), ("theta", PAPER_THETA)):
             if search.get(name) == filled:
                 del search[name]
+    if "planner" in asked and "iterations" not in asked:
+        search.pop("iterations", None)  # of the other planner
     for section, values in _without_none(data).items():
         if section == "area" and values:
             merged[section] = values

@@ -41,7 +41,7 @@ def training_covariance(model: Model, allowed: NDArray[np.bool_]) -> NDArray[np.
     validation maps is added as an exponential kernel fitted to it.
     """
     factor = np.column_stack([model.covariance_factor, model.mean])
-    leading = contrasts(_with_symmetries(factor @ factor.T, model.shape), allowed)
+    leading = contrasts(with_symmetries(factor @ factor.T, model.shape), allowed)
     share, residual = _residual(model)
     if share <= _LEAST_RESIDUAL:
         return leading
@@ -78,7 +78,7 @@ def _kernel_matrix(shape: tuple[int, int], kernel: Kernel) -> NDArray[np.float64
     return np.asarray(table[row[:, None, :, None], column[None, :, None, :]].reshape(rows * columns, -1))
 
 
-def _with_symmetries(covariance: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
+def with_symmetries(covariance: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
     """Return the mean of a covariance over the grid's symmetries: mirror images and, if square, transposition."""
     block = covariance.reshape(*shape, *shape)
     total = block + block[::-1, :, ::-1, :]

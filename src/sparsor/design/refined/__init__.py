@@ -1,0 +1,5 @@
+"""Routes that minimise the error to expect of the map, searched directly."""
+
+from sparsor.design.refined.search import DEFAULT_ITERATIONS, Route, Task, refine
+
+__all__ = ["DEFAULT_ITERATIONS", "Route", "Task", "refine"]

@@ -1,0 +1,54 @@
+"""What a route uses of its budget, as compiled code reads it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray  # noqa: TC002
+
+if TYPE_CHECKING:
+    from sparsor.design.budget import Budget
+    from sparsor.design.legs import LegTable
+
+
+class Costs(NamedTuple):
+    """A budget and what draws on it.
+
+    Parameters
+    ----------
+    legs : array of float64 (N, N)
+        Metres, cell widths or seconds; symmetric.
+    ends : array of float64 (N,)
+        The way between home and each cell.
+    closing : float
+        1 when the way from the last stop to the first counts, 0 otherwise.
+    per_stop, fixed, limit : float
+    """
+
+    legs: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    closing: float
+    per_stop: float
+    fixed: float
+    limit: float
+
+
+def costs(budget: Budget, legs: LegTable) -> Costs:
+    """Return a budget for the legs of a table."""
+    distance = budget.measure == "distance"
+    table = np.ascontiguousarray(legs.length if distance else legs.seconds)
+    ends = np.zeros(legs.size) if distance or budget.home is None else np.ascontiguousarray(budget.home)
+    closing = float(not distance and budget.home is None)
+    return Costs(table, ends, closing, float(budget.per_stop), float(budget.fixed), float(budget.limit))
+
+
+@njit(cache=True, nogil=True)
+def used(costs: Costs, stops: NDArray[np.int64]) -> float:
+    """Return what a route uses, as `Budget.used` does."""
+    first, last = stops[0], stops[-1]
+    total = costs.fixed + costs.ends[first] + costs.ends[last] + costs.closing * costs.legs[last, first]
+    for k in range(stops.size - 1):
+        total += costs.legs[stops[k], stops[k + 1]]
+    return float(total + costs.per_stop * stops.size)

@@ -1,0 +1,115 @@
+"""The expected error of a route: the trace of the posterior covariance, updated as cells come and go.
+
+A map is ``a + F x`` with ``x ~ N(0, I)``, an unknown level a, and what the factor F leaves, which is independent from
+cell to cell (Quinonero-Candela & Rasmussen 2005, section 6). Readings add up in the information matrix of x and a, so
+the error of any set of cells costs no more than the rank of F allows, and a change of k cells is an update of rank k.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray  # noqa: TC002
+
+from sparsor.design.refined.dense import inner_products, inverse, solve
+
+_LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
+_LEAST_NOISE = 1e-6  # of the map's variance
+
+
+class Belief(NamedTuple):
+    """What is known of maps before the flight.
+
+    Parameters
+    ----------
+    factor : array of float64 (N, r + 1)
+        Components of the covariance, and a last column of ones for the level; 0 outside the area.
+    spread : array of float64 (r + 1,)
+        Variance of each coefficient.
+    size : array of float64 (r + 1,)
+        Mean square of each column over the cells that count.
+    precision : array of float64 (N,)
+        One over the variance of a reading around what the factor says.
+    """
+
+    factor: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    size: NDArray[np.float64]
+    precision: NDArray[np.float64]
+
+
+def belief(
+    covariance: NDArray[np.float64], allowed: NDArray[np.bool_], *, rank: int = 96, noise: float = 0.0
+) -> Belief:
+    """Return the leading components of a covariance as the search needs them.
+
+    Parameters
+    ----------
+    covariance : array of float64 (N, N)
+        Of differences from the map's mean; mean variance 1 over the allowed cells.
+    allowed : array of bool (N,)
+        Cells that count and may be flown.
+    rank : int
+        Most components.
+    noise : float
+        Variance of a reading, in the unit of the covariance.
+    """
+    cells = np.flatnonzero(allowed)
+    values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
+    leading = values.argsort()[::-1][:rank]
+    leading = leading[values[leading] > _LEAST_NOISE * values.max()]
+    # The signs that LAPACK gives are its own; they do not change any result.
+    inside = vectors[:, leading] * np.sqrt(values[leading])
+    left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
+    factor = np.zeros((allowed.size, leading.size + 1))
+    factor[cells, :-1] = inside
+    factor[cells, -1] = 1.0
+    precision = np.zeros(allowed.size)
+    precision[cells] = 1 / (left + noise + _LEAST_NOISE)
+    spread = np.append(np.ones(leading.size), _LEVEL_VARIANCE)
+    return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, precision)
+
+
+@njit(cache=True, nogil=True)
+def posterior(prior: Belief, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of the coefficients after each cell was read with a share of its precision, (r+1, r+1)."""
+    cells = np.flatnonzero(share)
+    readings = np.empty((prior.spread.size, cells.size))
+    for k in range(cells.size):
+        scale = np.sqrt(share[cells[k]] * prior.precision[cells[k]])
+        for j in range(prior.spread.size):
+            readings[j, k] = scale * prior.factor[cells[k], j]
+    information = np.dot(readings, readings.T)
+    for j in range(prior.spread.size):
+        information[j, j] += 1 / prior.spread[j]
+    return inverse(information)
+
+
+@njit(cache=True, nogil=True)
+def expected_error(prior: Belief, covariance: NDArray[np.float64]) -> float:
+    """Return the mean variance of the map over the cells that count, less what no reading explains."""
+    total = 0.0
+    for j in range(prior.size.size):
+        total += prior.size[j] * covariance[j, j]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def changed(
+    prior: Belief, covariance: NDArray[np.float64], cells: NDArray[np.int64], difference: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Return what a change of the cells' shares does to the expected error, and the update that makes it.
+
+    By the Woodbury identity the posterior covariance P becomes ``P - left.T @ inv(inner) @ left``.
+    """
+    rows = np.empty((cells.size, prior.spread.size))
+    for i in range(cells.size):
+        rows[i] = prior.factor[cells[i]]
+    left = np.dot(rows, covariance)
+    inner = inner_products(left, rows)
+    for i in range(cells.size):
+        inner[i, i] += 1 / (difference[i] * prior.precision[cells[i]])
+    explained = solve(inner, inner_products(left * prior.size, left))
+    return -float(np.trace(explained)), left, inner

@@ -1,0 +1,260 @@
+"""Search for the route with the lowest expected error within a budget.
+
+Several starts are annealed in a coarse model of the map, hot to warm; the best of them go on in a fine model, warm to
+cold. Every chain of moves draws from its own stream and is as long as `iterations` says, so the answer depends on
+neither the number of workers nor their speed.
+"""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Event, Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sparsor.core.progress import Progress, silent
+from sparsor.core.streams import stream
+from sparsor.core.workers import one_blas_thread
+from sparsor.design.refined.annealing import anneal, route_error
+from sparsor.design.refined.costs import costs, used
+from sparsor.design.refined.crossings import crosses
+from sparsor.design.refined.flyover import flyover
+from sparsor.design.refined.posterior import belief
+from sparsor.design.refined.starts import starts
+from sparsor.errors import BudgetError, DesignError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sparsor.design.budget import Budget
+    from sparsor.design.legs import LegTable
+
+DEFAULT_ITERATIONS = 480_000
+_STREAM = 5  # not one of Algorithm 1's, nor of the rehearsal's
+_PIECE = 1000  # moves between two looks at the clock
+LEAST_ITERATIONS = 10
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """Some chains with one rank of the covariance, from one temperature to another."""
+
+    rank: int
+    chains: int
+    hot: float
+    cold: float
+
+
+# Chosen on validation maps; each stage gets half of the moves. See docs/decisions/0012-refined-search.md.
+_STAGES = (_Stage(64, 2, 0.1, 0.003), _Stage(128, 2, 0.003, 0.0003))
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the search is given.
+
+    Parameters
+    ----------
+    covariance : array of float64 (N, N)
+        Of maps of amplitude 1, differences from their mean; see `decoders.covariance`.
+    legs : LegTable
+    budget : Budget
+    noise : float
+        Variance of a reading, maps having a mean variance of 1.
+    hold_s, tau_s : float
+        Dwell at each stop and the sensor's time constant; 0: it answers at once.
+    """
+
+    covariance: NDArray[np.float64]
+    legs: LegTable
+    budget: Budget
+    noise: float = 0.0
+    hold_s: float = 0.0
+    tau_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        size = self.legs.size
+        if self.covariance.shape != (size, size):
+            raise DesignError(f"a covariance of shape {self.covariance.shape} does not fit a grid of {size} cells")
+        for name in ("noise", "hold_s", "tau_s"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
+
+
+@dataclass(frozen=True)
+class Route:
+    """A route and what to expect of it.
+
+    Parameters
+    ----------
+    stops : array of int64 (n,)
+        Turning points in path order; every cell under the legs between them is measured.
+    expected_error : float
+        Mean posterior variance over the allowed cells as a share of the maps' variance.
+    used : float
+        Of the budget.
+    interrupted : bool
+        Whether the search was ended early.
+    """
+
+    stops: NDArray[np.int64]
+    expected_error: float
+    used: float
+    interrupted: bool = False
+
+
+def refine(
+    task: Task,
+    *,
+    seed: int,
+    iterations: int = DEFAULT_ITERATIONS,
+    seconds: float | None = None,
+    begin: Sequence[NDArray[np.int64]] = (),
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Route:
+    """Search for the route with the lowest expected error.
+
+    Parameters
+    ----------
+    task : Task
+    seed : int
+    iterations : int
+        Moves tried, over all chains.
+    seconds : float, optional
+        Stop after about this long, searching again and again with that many moves; the answer then depends on the
+        machine.
+    begin : sequence of arrays of int64
+        Further routes to start from, e.g. Algorithm 1's; those that break the budget or cross themselves are left out.
+    workers : int
+        Threads.
+    progress : Progress
+
+    Returns
+    -------
+    Route
+        The best so far when interrupted from the keyboard.
+
+    Raises
+    ------
+    BudgetError
+        When the budget is too small for any start.
+    """
+    if iterations < LEAST_ITERATIONS:
+        raise DesignError(f"iterations is {iterations}; the refined search needs at least {LEAST_ITERATIONS}")
+    with one_blas_thread():
+        search = _Search(task, seed, iterations, seconds, workers, progress)
+        best = search.from_starts(begin)
+        turn = 1
+        while seconds is not None and not search.over:
+            best = search.again(turn, best)
+            turn += 1
+        return search.route(best)
+
+
+class _Search:
+    """The stages of one search, and the clock and the keyboard that may end it early."""
+
+    def __init__(
+        self, task: Task, seed: int, iterations: int, seconds: float | None, workers: int, progress: Progress
+    ) -> None:
+        allowed = task.legs.allowed
+        self.task, self.seed, self.moves, self.workers, self.progress = task, seed, iterations, workers, progress
+        self.over_cells = flyover(task.legs, hold_s=task.hold_s, tau_s=task.tau_s)
+        self.costs = costs(task.budget, task.legs)
+        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, noise=task.noise) for one in _STAGES]
+        self.begun, self.seconds = time.monotonic(), seconds
+        self.interrupted = Event()
+        self.done, self.lock = 0, Lock()
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is up or the search was interrupted."""
+        late = self.seconds is not None and time.monotonic() - self.begun > self.seconds
+        return late or self.interrupted.is_set()
+
+    def from_starts(self, begin: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """Return the best route that all stages find from the starts."""
+        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape)]
+        routes = [stops for stops in routes if self.fits(stops)]
+        if not routes:
+            say = self.task.budget.describe
+            raise BudgetError(f"no route of two cells or more within {say(self.costs.limit)}: allow a larger --budget")
+        for level, stage in enumerate(_STAGES):
+            routes = self.anneal_all(0, level, self.ranked(routes, level)[: stage.chains])
+        return self.ranked(routes, len(_STAGES) - 1)[0]
+
+    def again(self, turn: int, best: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return what the last stage makes of a route on other streams; it is no worse."""
+        level = len(_STAGES) - 1
+        return self.ranked(self.anneal_all(turn, level, [best] * _STAGES[level].chains), level)[0]
+
+    def fits(self, stops: NDArray[np.int64]) -> bool:
+        """Return whether a route is within the budget, inside the area and free of needless crossings."""
+        if stops.size < 2 or used(self.costs, stops) > self.costs.limit or not self.task.legs.allowed[stops].all():
+            return False
+        return not crosses(stops, self.costs.legs, self.over_cells.columns, 0, stops.size - 1)
+
+    def error(self, stops: NDArray[np.int64], level: int) -> float:
+        return float(route_error(self.beliefs[level], self.over_cells, stops))
+
+    def ranked(self, routes: list[NDArray[np.int64]], level: int) -> list[NDArray[np.int64]]:
+        """Return routes by their expected error, the lowest first; ties stay in order."""
+        return sorted(routes, key=lambda stops: self.error(stops, level))
+
+    def anneal_all(self, turn: int, level: int, routes: list[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
+        """Anneal routes side by side and return the best that each led to."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            chains = [pool.submit(self.chain, turn, level, number, stops) for number, stops in enumerate(routes)]
+            try:
+                return [one.result() for one in chains]
+            except KeyboardInterrupt:
+                self.interrupted.set()
+                return [one.result() for one in chains]
+
+    def chain(self, turn: int, level: int, number: int, stops: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Anneal one route through the temperatures of a stage, piece by piece."""
+        stage, rng = _STAGES[level], stream(self.seed, _STREAM, turn, level, number)
+        moves = self.moves // (len(_STAGES) * stage.chains)
+        temperatures = np.geomspace(stage.hot, stage.cold, moves)
+        best, lowest = stops, np.inf
+        for first in range(0, moves, _PIECE):
+            if self.over:
+                break
+            piece = temperatures[first : first + _PIECE]
+            stops, reached, error = anneal(self.beliefs[level], self.over_cells, self.costs, stops, piece, rng)
+            if error < lowest:
+                best, lowest = reached, error
+            self.tell(piece.size)
+        return best
+
+    def tell(self, moves: int) -> None:
+        with self.lock:
+            self.done += moves
+            if self.seconds is None:
+                self.progress("refining the route", min(self.done, self.moves), self.moves)
+            else:
+                passed = min(time.monotonic() - self.begun, self.seconds)
+                self.progress("refining the route", int(passed * 1000), int(self.seconds * 1000))
+
+    def route(self, stops: NDArray[np.int64]) -> Route:
+        """Return a route without the stops that change nothing."""
+        level = len(_STAGES) - 1
+        k = 1
+        while k < stops.size - 1:
+            without = np.delete(stops, k)
+            idle = self.error(without, level) <= self.error(stops, level) * (1 + _ROUNDING)
+            if idle and self.fits(without):
+                stops = without
+            else:
+                k += 1
+        return Route(
+            stops, self.error(stops, level), float(used(self.costs, stops)), interrupted=self.interrupted.is_set()
+        )

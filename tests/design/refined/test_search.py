@@ -1,0 +1,138 @@
+"""The refined search: better than what it starts from, within what it is given, the same from the same seed."""
+
+from __future__ import annotations
+
+from _thread import interrupt_main
+from dataclasses import replace
+from itertools import combinations, pairwise
+from threading import Event
+
+import numpy as np
+import pytest
+import shapely
+
+from sparsor.design import Budget, unit_legs
+from sparsor.design.decoders.covariance import kernel_covariance
+from sparsor.design.refined import Task, refine
+from sparsor.design.refined.annealing import route_error
+from sparsor.design.refined.costs import costs, used
+from sparsor.design.refined.crossings import crosses
+from sparsor.design.refined.flyover import flyover
+from sparsor.design.refined.posterior import belief
+from sparsor.design.refined.starts import most_telling, pivots, starts, tour_within
+from sparsor.errors import BudgetError, DesignError
+from sparsor.prior.statistics import Kernel
+
+SHAPE = (12, 12)
+LEGS = unit_legs(SHAPE)
+ALL = np.ones(LEGS.size, dtype=bool)
+LIMIT = 30.0
+
+
+def task(legs=LEGS, budget=None, noise=1e-3, **options):
+    covariance = kernel_covariance(SHAPE, Kernel(1.0, 5.0, 0.0), legs.allowed)
+    return Task(covariance, legs, budget or Budget(LIMIT, "distance"), noise, **options)
+
+
+def expected(one, stops):
+    """The error of the last stage's model, as a route states it."""
+    return route_error(belief(one.covariance, one.legs.allowed, rank=128, noise=one.noise), flyover(one.legs), stops)
+
+
+def test_the_route_is_within_the_budget_and_better_than_every_start():
+    one = task()
+    route = refine(one, seed=0, iterations=4000)
+    assert route.used == pytest.approx(LEGS.path_length(route.stops))
+    assert route.used <= LIMIT
+    begun = starts(belief(one.covariance, ALL, rank=128, noise=one.noise), costs(one.budget, LEGS), SHAPE)
+    assert len(begun) > 4
+    assert route.expected_error == pytest.approx(expected(one, route.stops))
+    assert route.expected_error < 0.98 * min(expected(one, stops) for stops in begun)
+
+
+def test_the_same_seed_gives_the_same_route_on_any_number_of_workers():
+    one, two = (refine(task(), seed=4, iterations=1200, workers=workers) for workers in (1, 3))
+    assert one.stops.tolist() == two.stops.tolist()
+    other = refine(task(), seed=5, iterations=1200)
+    assert other.stops.tolist() != one.stops.tolist()
+
+
+def test_no_two_legs_of_the_route_cross():
+    stops = refine(task(budget=Budget(60.0, "distance")), seed=1, iterations=3000).stops
+    row, column = np.divmod(stops, SHAPE[1])
+    legs = [shapely.LineString(pair) for pair in pairwise(np.stack([column, row], axis=1))]
+    assert not any(one.crosses(other) for one, other in combinations(legs, 2))
+
+
+def test_crossing_legs_are_seen_and_clear_ones_are_not():
+    bow_tie = np.array([0, 13, 1, 12])
+    assert crosses(np.array([0, 26, 2, 24]), LEGS.length, 12, 0, 3)
+    assert crosses(bow_tie, LEGS.length, 12, 0, 3)
+    assert not crosses(np.array([0, 2, 26, 24]), LEGS.length, 12, 0, 3)
+
+
+def test_the_route_stays_on_allowed_cells():
+    allowed = ALL.reshape(SHAPE).copy()
+    allowed[3:8, 4:9] = False
+    legs = replace(LEGS, allowed=allowed.ravel()).kept_inside()
+    route = refine(task(legs), seed=0, iterations=2000)
+    assert allowed.ravel()[legs.cells_under(route.stops)].all()
+    assert route.used <= LIMIT
+
+
+def test_a_time_budget_counts_stops_and_the_way_home():
+    home = np.full(LEGS.size, 3.0)
+    budget = Budget(60.0, "time", per_stop=2.0, fixed=5.0, home=home)
+    route = refine(task(budget=budget), seed=0, iterations=1000)
+    assert route.used == pytest.approx(budget.used(route.stops, LEGS))
+    assert route.used <= 60.0
+    closed = Budget(60.0, "time", per_stop=2.0)
+    stops = np.array([0, 5, 40])
+    assert used(costs(closed, LEGS), stops) == pytest.approx(closed.used(stops, LEGS))
+
+
+def test_a_slow_sensor_is_flown_with_other_stops_than_a_fast_one():
+    fast, slow = (refine(task(hold_s=20.0, tau_s=tau), seed=0, iterations=2000) for tau in (0.0, 10.0))
+    assert slow.expected_error > fast.expected_error
+
+
+def test_a_route_of_one_s_own_is_never_made_worse():
+    one = task()
+    good = refine(one, seed=0, iterations=4000)
+    again = refine(one, seed=9, iterations=100, begin=[good.stops])
+    assert again.expected_error <= good.expected_error * (1 + 1e-9)
+
+
+def test_an_interruption_gives_the_best_so_far():
+    pressed = Event()
+
+    def press(_task, done, _total):
+        if done > 1000 and not pressed.is_set():
+            pressed.set()
+            interrupt_main()  # what Ctrl-C does
+
+    route = refine(task(), seed=0, iterations=40_000, progress=press)
+    assert route.interrupted
+    assert route.used <= LIMIT
+
+
+def test_with_a_time_to_spend_it_goes_on():
+    route = refine(task(), seed=0, iterations=200, seconds=0.5)
+    assert route.expected_error <= refine(task(), seed=0, iterations=200).expected_error
+    assert not route.interrupted
+
+
+def test_rankings_name_each_cell_once():
+    prior = belief(task().covariance, ALL, rank=20, noise=1e-3)
+    for ranking in (pivots(prior), most_telling(prior)):
+        assert np.unique(ranking).size == ranking.size == 21
+        assert LEGS.path_length(tour_within(ranking, costs(Budget(LIMIT, "distance"), LEGS))) <= LIMIT
+
+
+def test_what_cannot_be_searched_is_refused():
+    with pytest.raises(BudgetError, match="no route of two cells"):
+        refine(task(budget=Budget(0.5, "distance")), seed=0)
+    with pytest.raises(DesignError, match="at least 10"):
+        refine(task(), seed=0, iterations=3)
+    with pytest.raises(DesignError, match="noise is -1"):
+        task(noise=-1.0)
