@@ -10,10 +10,10 @@ p = 0.03, theta = 3, M = 35. Both solve the same problems; the largest differenc
 from __future__ import annotations
 
 import argparse
-import time
 
 import numpy as np
 from sklearn.decomposition import sparse_encode
+from stopwatch import fastest
 from threadpoolctl import threadpool_limits
 
 from sparsor.core.streams import stream
@@ -36,8 +36,8 @@ def main() -> None:
     A, targets = phi @ psi, maps @ phi.T
     lasso(A, targets[:1], WEIGHT)  # compiled now
     with threadpool_limits(1):
-        ours, codes = timed(lambda: lasso(A, targets, WEIGHT), options.repeats)
-        theirs, reference = timed(
+        ours, codes = fastest(lambda: lasso(A, targets, WEIGHT), options.repeats)
+        theirs, reference = fastest(
             lambda: sparse_encode(targets, A.T, algorithm="lasso_lars", alpha=WEIGHT), max(1, options.repeats // 2)
         )
     difference = (objective(A, targets, codes) - objective(A, targets, reference)) / objective(A, targets, reference)
@@ -58,15 +58,6 @@ def problem(atoms: int, uncentred: bool):
     training = (maps.training - low) / (high - low)
     mean = 0.0 if uncentred else training.mean(axis=0)
     return learned_dictionary(training - mean, atoms, seed=0), (maps.validation - low) / (high - low) - mean
-
-
-def timed(work, repeats: int):
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = work()
-        seconds.append(time.perf_counter() - start)
-    return min(seconds), result
 
 
 def objective(A, targets, codes):

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from stopwatch import fastest
 
 from sparsor.core.mavlink_scan import STAMP
 from sparsor.flightlog import read_log
@@ -75,15 +76,6 @@ def pymavlink_count(path: Path) -> int:
     while log.recv_match(type=names) is not None:
         found += 1
     return found
-
-
-def fastest(work, repeats: int):
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = work()
-        seconds.append(time.perf_counter() - start)
-    return min(seconds), result
 
 
 def peak_mb(path: Path) -> float:

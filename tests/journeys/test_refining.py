@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from sparsor.cli.summary import mission_rows
+from sparsor.design.refined import DEFAULT_ITERATIONS
 from sparsor.errors import MissionError
 from sparsor.journeys.folder import write_mission
 from sparsor.journeys.planning import plan_mission
 from sparsor.mission.sidecar import read_sidecar
-from sparsor.mission.specification import REFINED_MOVES, changed, specification
+from sparsor.mission.specification import changed, specification
 
 BOX = (51.50, 25.27, 51.53, 25.30)
 REFINED = {"planner": "refined", "iterations": 3000}
@@ -55,10 +56,10 @@ def test_the_summary_does_not_speak_of_sums(mission):
 
 def test_each_planner_has_its_own_number_of_iterations():
     spec = asked(planner="refined")
-    assert spec.search.iterations == REFINED_MOVES
-    assert changed(asked(), {"search": {"planner": "refined"}}, base=Path("/")).search.iterations == REFINED_MOVES
+    assert spec.search.iterations == DEFAULT_ITERATIONS
+    assert changed(asked(), {"search": {"planner": "refined"}}, base=Path("/")).search.iterations == DEFAULT_ITERATIONS
     assert changed(spec, {"search": {"planner": "monte-carlo"}}, base=Path("/")).search.iterations == 4000
-    assert changed(spec, {"search": {"seed": 3}}, base=Path("/")).search.iterations == REFINED_MOVES
+    assert changed(spec, {"search": {"seed": 3}}, base=Path("/")).search.iterations == DEFAULT_ITERATIONS
 
 
 @pytest.mark.parametrize("search", [{"paper": True}, {"lambda_path": 1.0}])

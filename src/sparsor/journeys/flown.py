@@ -11,6 +11,7 @@ import numpy as np
 from sparsor.core.progress import Progress, silent
 from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
+from sparsor.journeys.folder import SPECIFICATION_FILE
 from sparsor.journeys.modelling import choose_prior, size_difference
 from sparsor.mission import read_plan
 from sparsor.mission.items import FRAME_RELATIVE
@@ -85,7 +86,7 @@ def mission_of_folder(folder: Path) -> FlownMission:
     return FlownMission(
         name=sidecar.name,
         folder=folder,
-        files=(path, folder / "mission.toml", *plans.values()),
+        files=(path, folder / SPECIFICATION_FILE, *plans.values()),
         grid=sidecar.grid,
         allowed=sidecar.allowed,
         model=sidecar.model,

@@ -30,7 +30,6 @@ Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
 HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
 PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
 DEFAULT_BUDGET = "10%"
-MONTE_CARLO_SAMPLES, REFINED_MOVES = 4000, 480_000
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 
 
@@ -92,7 +91,7 @@ class SearchSection(_Section):
     lambda_valid: NotNegative = 1.0
     lambda_path: NotNegative | None = None
     lambda_incoh: NotNegative | None = None
-    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = MONTE_CARLO_SAMPLES
+    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = 4000
     time_s: Positive | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     budget: str | None = None
@@ -128,8 +127,10 @@ class SearchSection(_Section):
         if not isinstance(given, dict):
             return given
         filled = {key: value for key, value in given.items() if value is not None}
-        if filled.get("planner") == "refined":
-            filled.setdefault("iterations", REFINED_MOVES)
+        if filled.get("planner") == "refined" and "iterations" not in filled:
+            from sparsor.design.refined import DEFAULT_ITERATIONS
+
+            filled["iterations"] = DEFAULT_ITERATIONS
         both = "probability" in filled and "theta" in filled
         no_default = filled.get("paper") or "lambda_path" in filled or both
         if "budget" not in filled and no_default:

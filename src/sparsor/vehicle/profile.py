@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from sparsor.core.tomlmodel import model_of_file, model_of_mapping, model_of_toml
-from sparsor.errors import VehicleError
+from sparsor.vehicle.packaged import Profile, load_profile, packaged_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from pathlib import Path
 
 # MAV_TYPE of each kind (MAVLink common.xml). A new kind is an entry here and in `Kind`, a packaged profile,
 # and its own sequence of items in mission.
@@ -22,7 +19,7 @@ Kind = Literal["quad"]
 Speed = Annotated[float, Field(gt=0, le=200, allow_inf_nan=False)]
 
 
-class Vehicle(BaseModel):
+class Vehicle(Profile):
     """What a vehicle can do; every value in the unit of its name.
 
     Build one with `load_vehicle` or `Vehicle.from_mapping`, whose errors are sentences.
@@ -47,8 +44,6 @@ class Vehicle(BaseModel):
         How near to a waypoint counts as reached.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
     name: Annotated[str, Field(min_length=1, max_length=60)]
     kind: Kind
     cruise_m_s: Speed
@@ -67,29 +62,10 @@ class Vehicle(BaseModel):
         """MAV_TYPE of this kind of vehicle."""
         return MAV_TYPES[self.kind]
 
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, object], source: str) -> Vehicle:
-        """Check the values of a profile.
-
-        Parameters
-        ----------
-        values : mapping
-            As TOML gives them.
-        source : str
-            Named in the errors.
-
-        Raises
-        ------
-        VehicleError
-            When a key is unknown or missing or a value is not allowed; names the first of them.
-        """
-        return model_of_mapping(cls, values, source, VehicleError)
-
 
 def packaged_vehicles() -> list[str]:
     """Return the names of the profiles that come with sparsor, sorted."""
-    folder = resources.files("sparsor.vehicle") / "profiles"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return packaged_names("profiles")
 
 
 def load_vehicle(name_or_path: str | Path) -> Vehicle:
@@ -110,12 +86,4 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     >>> load_vehicle("quad").cruise_m_s
     10.0
     """
-    text = str(name_or_path)
-    if text.lower().endswith(".toml"):
-        return model_of_file(Vehicle, Path(text), "vehicle profile", VehicleError)
-    if text in packaged_vehicles():
-        packaged = resources.files("sparsor.vehicle") / "profiles" / f"{text}.toml"
-        return model_of_toml(Vehicle, packaged.read_bytes(), f"the packaged profile '{text}'", VehicleError)
-    raise VehicleError(
-        f"unknown vehicle '{text}'; known are {', '.join(packaged_vehicles())}, or give the path of a .toml file"
-    )
+    return load_profile(Vehicle, "vehicle", "profiles", name_or_path)

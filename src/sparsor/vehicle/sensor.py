@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from sparsor.core.tomlmodel import model_of_file, model_of_mapping, model_of_toml
-from sparsor.errors import VehicleError
+from sparsor.vehicle.packaged import Profile, load_profile, packaged_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from pathlib import Path
 
 Seconds = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
 
 
-class SensorProfile(BaseModel):
+class SensorProfile(Profile):
     """How a sensor answers; every value in the unit of its name, or in `unit`.
 
     Build one with `load_sensor` or `SensorProfile.from_mapping`, whose errors are sentences.
@@ -44,8 +41,6 @@ class SensorProfile(BaseModel):
         Lowest and highest reading; those at an end, or beyond, are saturated.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
     name: Annotated[str, Field(min_length=1, max_length=60)]
     gas: Annotated[str, Field(min_length=1, max_length=20)] = "NO2"
     unit: Annotated[str, Field(min_length=1, max_length=20)] = "ppb"
@@ -67,29 +62,10 @@ class SensorProfile(BaseModel):
         """The sensor as people read it."""
         return f"{self.name}: {self.gas} in {self.unit}, t90 {self.t90_s:g} s, noise {self.noise_sd:g} {self.unit}"
 
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, object], source: str) -> SensorProfile:
-        """Check the values of a profile.
-
-        Parameters
-        ----------
-        values : mapping
-            As TOML gives them.
-        source : str
-            Named in the errors.
-
-        Raises
-        ------
-        VehicleError
-            When a key is unknown or missing or a value is not allowed; names the first of them.
-        """
-        return model_of_mapping(cls, values, source, VehicleError)
-
 
 def packaged_sensors() -> list[str]:
     """Return the names of the sensor profiles that come with sparsor, sorted."""
-    folder = resources.files("sparsor.vehicle") / "sensors"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return packaged_names("sensors")
 
 
 def load_sensor(name_or_path: str | Path = "no2") -> SensorProfile:
@@ -110,12 +86,4 @@ def load_sensor(name_or_path: str | Path = "no2") -> SensorProfile:
     >>> load_sensor().t90_s, load_sensor().noise_sd, load_sensor().unit
     (30.0, 5.0, 'ppb')
     """
-    text = str(name_or_path)
-    if text.lower().endswith(".toml"):
-        return model_of_file(SensorProfile, Path(text), "sensor profile", VehicleError)
-    if text in packaged_sensors():
-        packaged = resources.files("sparsor.vehicle") / "sensors" / f"{text}.toml"
-        return model_of_toml(SensorProfile, packaged.read_bytes(), f"the packaged profile '{text}'", VehicleError)
-    raise VehicleError(
-        f"unknown sensor '{text}'; known are {', '.join(packaged_sensors())}, or give the path of a .toml file"
-    )
+    return load_profile(SensorProfile, "sensor", "sensors", name_or_path)

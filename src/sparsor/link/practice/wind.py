@@ -64,11 +64,6 @@ class Wind:
         self._gust = (0.0, 0.0)
 
     @property
-    def blows(self) -> bool:
-        """Whether there is any."""
-        return self.settings.speed_m_s > 0 or self.settings.gusts_m_s > 0
-
-    @property
     def east_m_s(self) -> float:
         """Towards the east."""
         return self._steady[0] + self._gust[0]
