@@ -27,15 +27,15 @@ from sparsor.core.metrics import relative_error, squared_error
 from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
 from sparsor.design import Budget, unit_legs
-from sparsor.design.decoders.covariance import contrasts, kernel_covariance, unit_shapes, with_symmetries
+from sparsor.design.decoders.covariance import contrasts, kernel_covariance, with_symmetries
 from sparsor.design.refined import DEFAULT_ITERATIONS, Task, refine
 from sparsor.design.refined.costs import costs
 from sparsor.design.refined.posterior import belief
 from sparsor.design.refined.starts import pivots, tour_within
 from sparsor.prior.reading import read_field
-from sparsor.prior.statistics import Kernel
+from sparsor.prior.statistics import Kernel, shape_covariance
 from sparsor.study import blocked_split, scaled, study_maps
-from sparsor.study.protocol import BLOCKED_FOLDS, PAPER_PIXELS
+from sparsor.study.protocol import BLOCKED_FOLDS, PAPER_PIXELS, dense_maps
 
 SHAPE = (32, 32)
 LEGS = unit_legs(SHAPE)
@@ -56,19 +56,19 @@ class Fold:
     both: dict
 
     @classmethod
-    def of(cls, maps, number):
+    def of(cls, maps, field, pixels, number):
         """Return one of the blocked folds."""
         sets = scaled(maps, blocked_split(maps, number))
         both = np.concatenate([sets.training, sets.validation])
-        return cls(sets, covariances(sets.training), covariances(both))
+        training, final = (dense_maps(field, number, pixels, validation=more) for more in (False, True))
+        return cls(sets, covariances(sets.training, training), covariances(both, final))
 
 
-def covariances(maps):
-    """Return the covariance of maps of equal amplitude, and of the maps as they are."""
-    shapes = unit_shapes(maps, ALL)
+def covariances(maps, dense):
+    """Return the covariance of shapes of densely laid windows, and of the maps as they are."""
     off = maps - maps.mean(axis=0)
     return {
-        "scale-free": contrasts(with_symmetries(shapes.T @ shapes, SHAPE), ALL),
+        "scale-free": contrasts(with_symmetries(shape_covariance(dense), SHAPE), ALL),
         "plain": contrasts(with_symmetries(off.T @ off, SHAPE), ALL),
     }
 
@@ -152,8 +152,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.quick:
         options.iterations = min(options.iterations, 20_000)
-    maps = study_maps(read_field(options.field), None if options.native else PAPER_PIXELS)
-    folds = [Fold.of(maps, number) for number in range(1 if options.quick else len(BLOCKED_FOLDS))]
+    field, pixels = read_field(options.field), None if options.native else PAPER_PIXELS
+    maps = study_maps(field, pixels)
+    folds = [Fold.of(maps, field, pixels, number) for number in range(1 if options.quick else len(BLOCKED_FOLDS))]
     metric = squared_error if options.squared else relative_error
     print(
         f"{options.field.name}: {len(maps.maps)} maps, {maps.dropped} dropped, {maps.filled} filled; {metric.__name__}"

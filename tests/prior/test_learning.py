@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from sparsor.errors import ModelError
 from sparsor.prior.field import Field
-from sparsor.prior.learning import TrainingMaps, split_maps, untuned_model, with_mirror_images
+from sparsor.prior.learning import TrainingMaps, maps_of_fields, split_maps, untuned_model, with_mirror_images
 from sparsor.prior.model import arrays_to_npz, model_arrays
+from sparsor.prior.statistics import shape_covariance
 from sparsor.prior.windows import ground_windows, pixel_windows
 
 SHAPE = (6, 7)
@@ -73,6 +74,22 @@ def test_each_field_gives_its_share_and_no_map_is_in_both_sets(count):
         assert min(held) - max(learned) == 4
         assert len(set(range(int(maps.column.max()) + 1)) - set(range(max(learned) + 1))) <= 0.15 * 30 + 4
     assert len(parts.validation) <= 56
+
+
+def test_the_covariance_is_learned_from_dense_windows_west_of_all_validation_windows():
+    rng = np.random.default_rng(1)
+    field = replace(longitudes(100, 160), values=rng.normal(size=(100, 160)))
+    windows = ground_windows(field, 60_000, 50_000, (4, 5))
+    parts = maps_of_fields([field], [windows], (4, 5))
+    held_west = windows.west[windows.column > windows.column.max() - round(0.15 * (windows.column.max() + 1))].min()
+    # Whatever lies in the east, under the validation windows, is not seen.
+    values = field.values.copy()
+    values[:, int(np.ceil(held_west)) :] = 9e9
+    elsewhere = replace(field, values=values)
+    np.testing.assert_array_equal(maps_of_fields([elsewhere], [windows], (4, 5)).shapes, parts.shapes)
+    assert not np.allclose(parts.shapes, shape_covariance([parts.training]), atol=0.02)
+    model = untuned_model(parts, atoms=8, dictionary="polynomial")
+    np.testing.assert_allclose(model.covariance_factor @ model.covariance_factor.T, parts.shapes, atol=1e-9)
 
 
 def test_what_is_known_of_the_windows_goes_on():

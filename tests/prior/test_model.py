@@ -109,7 +109,7 @@ def test_the_file_holds_plain_arrays_that_others_can_read():
             "mean": "f",
             **dict.fromkeys(LARGE, "f"),
         }
-        assert json.loads(str(stored["model"]))["format"] == "sparsor model 1"
+        assert json.loads(str(stored["model"]))["format"] == "sparsor model 2"
     assert {field.name for field in fields(Model)} == set(json.loads(str(model_arrays(made())["model"]))) - {
         "format"
     } | {"mean", *LARGE}
@@ -226,7 +226,7 @@ def test_a_missing_value_is_named(key):
 
 
 def test_a_model_of_another_version_is_said_so():
-    with pytest.raises(ModelError, match="m: made as 'sparsor model 9'; this version reads 'sparsor model 1'"):
+    with pytest.raises(ModelError, match="m: made as 'sparsor model 9'; this version reads 'sparsor model 2'"):
         model_from_arrays(with_about(format="sparsor model 9"), "m")
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sparsor.errors import ModelError
-from sparsor.prior.statistics import Kernel, covariance_factor, fit_kernel, variogram
+from sparsor.prior.statistics import Kernel, covariance_factor, fit_kernel, shape_covariance, variogram
 
 SHAPE = (16, 18)
 LAGS = np.arange(1, 9)
@@ -140,24 +140,36 @@ def test_a_kernel_says_its_length_and_nugget_in_words():
 def test_the_factor_gives_a_covariance_of_low_rank_back(rank, count, seed):
     rng = np.random.default_rng(seed)
     maps = rng.normal(size=(count, rank)) @ rng.normal(size=(rank, 72)) + rng.normal(size=72)
-    factor = covariance_factor(maps)
     covariance = np.cov(maps, rowvar=False)
+    factor = covariance_factor(covariance)
     np.testing.assert_allclose(factor @ factor.T, covariance, atol=1e-10 * np.abs(covariance).max())
 
 
-def test_of_many_components_the_leading_64_are_kept():
-    maps = exponential_maps(3.0, count=150)[:, :100]
-    factor = covariance_factor(maps)
-    assert factor.shape == (100, 64)
-    values = np.linalg.eigvalsh(np.cov(maps, rowvar=False))[::-1]
-    np.testing.assert_allclose(np.linalg.eigvalsh(factor.T @ factor)[::-1], values[:64], rtol=1e-8)
+def test_of_many_components_the_leading_384_are_kept_largest_first():
+    draw = np.random.default_rng(3).normal(size=(600, 400))
+    covariance = draw.T @ draw / 600
+    factor = covariance_factor(covariance)
+    assert factor.shape == (400, 384)
+    values = np.linalg.eigvalsh(covariance)[::-1]
+    np.testing.assert_allclose(np.square(factor).sum(axis=0), values[:384], rtol=1e-8)
     # No other factor of that size is nearer (Eckart and Young): what is left has the remaining eigenvalues.
-    left = np.cov(maps, rowvar=False) - factor @ factor.T
-    np.testing.assert_allclose(np.linalg.norm(left), np.linalg.norm(values[64:]), rtol=1e-8)
+    left = covariance - factor @ factor.T
+    np.testing.assert_allclose(np.linalg.norm(left), np.linalg.norm(values[384:]), rtol=1e-8)
 
 
-def test_the_factor_forgets_the_level_and_scales_with_the_maps():
+def test_shapes_know_neither_level_nor_amplitude():
+    rng = np.random.default_rng(4)
     maps = exponential_maps(3.0, count=9)
-    one, other = covariance_factor(maps), covariance_factor(5.0 + 3.0 * maps)
-    assert one.shape == (288, 8)
-    np.testing.assert_allclose(other @ other.T, 9.0 * one @ one.T, atol=1e-9)
+    level, amplitude = rng.normal(size=(9, 1)), rng.uniform(0.1, 9.0, (9, 1))
+    expected = shape_covariance([maps])
+    np.testing.assert_allclose(shape_covariance([level + amplitude * maps]), expected, atol=1e-9)
+    assert np.trace(expected) == pytest.approx(288)
+    np.testing.assert_allclose(expected.sum(axis=0), 0.0, atol=1e-9)
+
+
+def test_the_covariance_of_shapes_adds_up_from_any_parts_and_leaves_flat_maps_out():
+    maps = exponential_maps(3.0, count=9)
+    parts = shape_covariance(iter([maps[:2], maps[2:3], np.vstack([maps[3:], np.full((2, 288), 7.0)])]))
+    np.testing.assert_allclose(parts, shape_covariance([maps]), atol=1e-12)
+    with pytest.raises(ModelError, match="no contrast"):
+        shape_covariance([np.full((3, 288), 7.0)])

@@ -38,7 +38,7 @@ def maps():
     """As many maps in as many places as the paper's, of a few cells."""
     row, column = (place.ravel() for place in np.indices((28, 40)))
     values = np.random.default_rng(0).normal(7.0, 2.0, (1120, 4))
-    return MapSet(values, (float("nan"),) * 2, row, column, 0, 0, "ppb", "made")
+    return MapSet(values, (float("nan"),) * 2, row, column, 32.0 * column, 0, 0, "ppb", "made")
 
 
 def pixels(maps, index):

@@ -12,7 +12,7 @@ from sparsor.geodesy import BoundingBox
 from sparsor.journeys.modelling import learn_model, representation_error, with_sources
 from sparsor.prior.builtin import SHAPE
 from sparsor.prior.dictionary import DictionaryName
-from sparsor.prior.learning import DEFAULT_ATOMS, split_maps
+from sparsor.prior.learning import DEFAULT_ATOMS, maps_of_fields
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz
 from sparsor.prior.reading import read_field
 from sparsor.prior.windows import ground_windows, nearest_resolved_m
@@ -104,7 +104,7 @@ def learn_from_fields(request: LearnRequest, output: Path, *, progress: Progress
         sets.append(ground_windows(field, *window_m, SHAPE))
         progress("cutting windows", done, len(fields))
     model = learn_model(
-        split_maps(sets, SHAPE),
+        maps_of_fields(fields, sets, SHAPE, progress),
         atoms=request.atoms,
         centred=request.centred,
         dictionary=cast("DictionaryName", request.dictionary),

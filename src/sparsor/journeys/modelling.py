@@ -29,7 +29,7 @@ from sparsor.prior.builtin import (
     builtin_model,
     nearest_side_m,
 )
-from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, split_maps, untuned_model
+from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, maps_of_fields, untuned_model
 from sparsor.prior.mismatch import mismatch_factor
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz, read_model
 from sparsor.prior.reading import read_field
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from sparsor.prior.field import Field
 
 # Bumped whenever learning gives other models, so that cached ones are not taken for them.
-_LEARNING_VERSION = 1
+_LEARNING_VERSION = 2
 _SAME_SIZE = 1.02
 _BETWEEN_SIDES = 1.6  # no box between the built-in sizes is further from one than this
 
@@ -209,8 +209,9 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
 
     def learn() -> Model:
         progress("cutting windows", 0, 1)
-        maps = split_maps([ground_windows(field, *window_m, SHAPE)], SHAPE)
+        windows = ground_windows(field, *window_m, SHAPE)
         progress("cutting windows", 1, 1)
+        maps = maps_of_fields([field], [windows], SHAPE, progress)
         return learn_model(maps, atoms=atoms, centred=not paper, progress=progress)
 
     model = _cached(key, learn)

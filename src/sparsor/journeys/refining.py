@@ -9,11 +9,12 @@ import numpy as np
 from sparsor.core.workers import one_blas_thread
 from sparsor.design import Candidate
 from sparsor.design.decoders import Measurements
-from sparsor.design.decoders.covariance import training_covariance, unit_shapes
+from sparsor.design.decoders.covariance import training_covariance
 from sparsor.design.decoders.decode import DecoderName, candidates
 from sparsor.design.decoders.setting import Setting
 from sparsor.design.refined import Task, refine
 from sparsor.errors import DesignError
+from sparsor.prior.statistics import unit_shapes
 
 if TYPE_CHECKING:
     from sparsor.core.progress import Progress

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,6 +82,11 @@ class Field:
             float(self.lon_deg[-1]) + half_width,
             float(self.lat_deg[0]) + half_height,
         )
+
+    def west_of(self, pixels: float) -> Field:
+        """Return the part west of a line, `pixels` from the west edge; pixels on the line are left out."""
+        columns = int(pixels + 1e-6)
+        return replace(self, values=self.values[:, :columns], lon_deg=self.lon_deg[:columns])
 
     @property
     def gap_fraction(self) -> float:

@@ -65,7 +65,7 @@ class Lattice:
                 yield row, int(index // self.share[row]), (top, bottom, left, right)
 
 
-def lay_windows(field: Field, east_m: float, north_m: float, most: int | None = None) -> Lattice:
+def lay_windows(field: Field, east_m: float, north_m: float, most: int | None = None, *, per_side: int = 4) -> Lattice:
     """Return windows over a field, a quarter of a side apart, or as much more as keeps them to `most`.
 
     Parameters
@@ -76,16 +76,18 @@ def lay_windows(field: Field, east_m: float, north_m: float, most: int | None = 
         Sides of a window, metres.
     most : int, optional
         Upper limit on their number.
+    per_side : int
+        Steps from window to window that make a side: 4 for a quarter of it.
 
     Returns
     -------
     Lattice
         Of no windows where none fits.
     """
-    lattice = _lattice(field, east_m, north_m, 1.0)
+    lattice = _lattice(field, east_m, north_m, stretch := 4 / per_side)
     if most is None or lattice.count <= most:
         return lattice
-    stretch = math.sqrt(lattice.count / most)
+    stretch *= math.sqrt(lattice.count / most)
     while (lattice := _lattice(field, east_m, north_m, stretch)).count > most:
         stretch *= 1.02
     return lattice

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,20 +16,24 @@ from sparsor.prior.dictionary import (
     polynomial_dictionary,
 )
 from sparsor.prior.model import Model
-from sparsor.prior.statistics import covariance_factor, fit_kernel
+from sparsor.prior.statistics import covariance_factor, fit_kernel, shape_covariance
+from sparsor.prior.windows import MapSet, ground_windows
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sparsor.prior.windows import MapSet
+    from sparsor.prior.field import Field
 
 DEFAULT_ATOMS = 256
 _VALIDATION_SHARE = 0.15
 _OVERLAP_COLUMNS = 3  # windows a quarter side apart overlap as far as this
 _MOST_VALIDATION = 56  # maps the search scores candidates on: 5 % of the paper's 1120
 _FEWEST_MAPS = 8
+# Windows a sixteenth of a side apart give up to 13 % less error than a quarter apart, closer ones no less: see
+# docs/decisions/0012-refined-search.md.
+_DENSE_PER_SIDE = 16
 _UNTUNED = 1e-3  # stands in for lambda until it is chosen on the validation maps
 
 
@@ -44,6 +48,8 @@ class TrainingMaps:
     window_m : tuple of float
         East and north extent of a window, metres.
     unit, source : str
+    shapes : array of float64 (N, N), optional
+        Covariance of shapes (see `shape_covariance`) of more windows than those for training; None: of these.
     """
 
     training: NDArray[np.float64]
@@ -52,6 +58,36 @@ class TrainingMaps:
     window_m: tuple[float, float]
     unit: str
     source: str
+    shapes: NDArray[np.float64] | None = None
+
+
+def maps_of_fields(
+    fields: Sequence[Field], sets: Sequence[MapSet], shape: tuple[int, int], progress: Progress = silent
+) -> TrainingMaps:
+    """Split the windows of fields, and lay more of them for the covariance, none on ground kept for validation.
+
+    Parameters
+    ----------
+    fields : sequence of Field
+    sets : sequence of MapSet
+        Windows of each, from `ground_windows`.
+    shape : tuple of int
+    progress : Progress
+
+    Raises
+    ------
+    ModelError
+        As `split_maps`.
+    """
+    maps = split_maps(sets, shape)
+
+    def dense() -> Iterator[NDArray[np.float64]]:
+        for done, (field, windows) in enumerate(zip(fields, sets, strict=True), start=1):
+            west = field.west_of(float(windows.west[windows.column >= _first_held(windows)].min()))
+            yield ground_windows(west, *maps.window_m, shape, per_side=_DENSE_PER_SIDE).maps
+            progress("learning the covariance", done, len(fields))
+
+    return replace(maps, shapes=shape_covariance(dense()))
 
 
 def split_maps(sets: Sequence[MapSet], shape: tuple[int, int]) -> TrainingMaps:
@@ -72,10 +108,9 @@ def split_maps(sets: Sequence[MapSet], shape: tuple[int, int]) -> TrainingMaps:
         raise ModelError(f"windows of different sizes, {sizes} m, do not go together; cut all of one size")
     training, validation = [], []
     for maps in sets:
-        columns = int(maps.column.max()) + 1
-        held = max(1, round(_VALIDATION_SHARE * columns))
-        validation.append(maps.maps[maps.column >= columns - held])
-        training.append(maps.maps[maps.column < columns - held - _OVERLAP_COLUMNS])
+        first = _first_held(maps)
+        validation.append(maps.maps[maps.column >= first])
+        training.append(maps.maps[maps.column < first - _OVERLAP_COLUMNS])
     held_out, learned_from = np.concatenate(validation), np.concatenate(training)
     if len(learned_from) < _FEWEST_MAPS or not len(held_out):
         raise ModelError(
@@ -86,6 +121,12 @@ def split_maps(sets: Sequence[MapSet], shape: tuple[int, int]) -> TrainingMaps:
     spread = np.linspace(0, len(held_out) - 1, min(_MOST_VALIDATION, len(held_out))).round().astype(int)
     source = "; ".join(maps.source for maps in sets)
     return TrainingMaps(learned_from, held_out[spread], shape, sets[0].window_m, units[0], source)
+
+
+def _first_held(maps: MapSet) -> int:
+    """Return the first window column kept for validation."""
+    columns = int(maps.column.max()) + 1
+    return columns - max(1, round(_VALIDATION_SHARE * columns))
 
 
 def with_mirror_images(maps: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
@@ -155,7 +196,7 @@ def untuned_model(
         shape=maps.shape,
         dictionary=psi,
         mean=mean,
-        covariance_factor=covariance_factor(training),
+        covariance_factor=covariance_factor(shape_covariance([training]) if maps.shapes is None else maps.shapes),
         kernel=fit_kernel(training, maps.shape),
         lasso_weight=_UNTUNED,
         validation=validation,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-FORMAT = "sparsor model 1"
+FORMAT = "sparsor model 2"
 
 # What numpy, zipfile and the parsers below them raise for files that are damaged or made up.
 _DAMAGED = (
@@ -58,7 +58,7 @@ class Model:
     mean : array of float64 (N,)
         Taken off the maps before they are coded; zeros where the model is not centred (the paper's).
     covariance_factor : array of float64 (N, R)
-        F with ``F F^T`` the training maps' covariance.
+        F with ``F F^T`` the covariance of training windows, each less its mean and over its spread.
     kernel : Kernel
         Exponential covariance fitted to the training maps.
     lasso_weight : float

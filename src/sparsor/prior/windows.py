@@ -36,7 +36,9 @@ class MapSet:
         East and north side of each window on the ground, metres; NaN where only pixels are known.
     row, column : array of int (n,)
         Place of each window in the lattice of windows, from the north and from the west. Windows four or
-        more columns apart share no ground.
+        more columns apart share no ground, unless they were laid more densely than four a side.
+    west : array of float64 (n,)
+        West edge of each window, pixels from the field's.
     dropped : int
         Windows left out because more than 5 % of their pixels are gaps.
     filled : int
@@ -56,13 +58,14 @@ class MapSet:
     window_m: tuple[float, float]
     row: NDArray[np.int64]
     column: NDArray[np.int64]
+    west: NDArray[np.float64]
     dropped: int
     filled: int
     unit: str
     source: str
 
     def __post_init__(self) -> None:
-        if self.maps.ndim != 2 or not len(self.maps) == len(self.row) == len(self.column):
+        if self.maps.ndim != 2 or not len(self.maps) == len(self.row) == len(self.column) == len(self.west):
             raise FieldError(
                 f"{self.source}: maps of shape {self.maps.shape} do not fit {len(self.row)} window rows and "
                 f"{len(self.column)} window columns"
@@ -134,7 +137,9 @@ def pixel_windows(
     return _cut(array, frames, (side, side), window_m=(math.nan, math.nan), unit=unit, source=source)
 
 
-def ground_windows(field: Field, east_m: float, north_m: float, shape: tuple[int, int] = (32, 32)) -> MapSet:
+def ground_windows(
+    field: Field, east_m: float, north_m: float, shape: tuple[int, int] = (32, 32), *, per_side: int = 4
+) -> MapSet:
     """Return windows of one size on the ground (method.md, Ground scale).
 
     Rows of windows follow each other from the north by a quarter of the north side. A window is as many
@@ -151,6 +156,8 @@ def ground_windows(field: Field, east_m: float, north_m: float, shape: tuple[int
         Sides of a window, metres.
     shape : tuple of int
         Rows and columns of cells in a map.
+    per_side : int
+        Steps from window to window that make a side: more lay them more densely.
 
     Returns
     -------
@@ -171,7 +178,7 @@ def ground_windows(field: Field, east_m: float, north_m: float, shape: tuple[int
         )
     return _cut(
         field.values,
-        lay_windows(field, east_m, north_m, most=MOST_WINDOWS).frames(field),
+        lay_windows(field, east_m, north_m, most=MOST_WINDOWS, per_side=per_side).frames(field),
         shape,
         window_m=(east_m, north_m),
         unit=field.unit,
@@ -234,6 +241,7 @@ def _cut(
 ) -> MapSet:
     maps: list[NDArray[np.float64]] = []
     places: list[tuple[int, int]] = []
+    west: list[float] = []
     dropped = filled = 0
     for row, column, (top, bottom, left, right) in frames:
         row0, column0 = math.floor(top), math.floor(left)
@@ -248,9 +256,10 @@ def _cut(
         bounds = (top - row0, bottom - row0, left - column0, right - column0)
         maps.append(cell_means(block, bounds, shape).ravel())
         places.append((row, column))
+        west.append(left)
     place = np.array(places, dtype=np.int64).reshape(-1, 2)
     stacked = np.array(maps).reshape(len(maps), shape[0] * shape[1])
-    return MapSet(stacked, window_m, place[:, 0], place[:, 1], dropped, filled, unit, source)
+    return MapSet(stacked, window_m, place[:, 0], place[:, 1], np.array(west), dropped, filled, unit, source)
 
 
 def _too_small(field: Field, east_m: float, north_m: float, shape: tuple[int, int]) -> str:

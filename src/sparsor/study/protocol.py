@@ -13,12 +13,15 @@ from sparsor.prior.resampling import resample_bilinear
 from sparsor.prior.windows import MapSet, pixel_windows
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from sparsor.prior.field import Field
 
 PAPER_PIXELS = (994, 1390)
 WINDOW, STRIDE, FACTOR = 128, 32, 4
+DENSE_STRIDE = 8  # of the windows that a covariance is learned from: a sixteenth of a side
 OVERLAP_NOTE = (
     "random split: neighbouring windows overlap by 75 %, so test maps have near-twins in training; "
     "the paper's protocol, not the accuracy to expect"
@@ -76,8 +79,33 @@ def study_maps(field: Field, pixels: tuple[int, int] | None = PAPER_PIXELS) -> M
     pixels : tuple of int, optional
         Rows and columns it is first resampled to (bilinear); None keeps the native pixels.
     """
-    values = field.values if pixels is None else resample_bilinear(field.values, pixels)
+    values = _pixels(field, pixels)
     return pixel_windows(values, window=WINDOW, stride=STRIDE, factor=FACTOR, unit=field.unit, source=field.source)
+
+
+def dense_maps(
+    field: Field, fold: int, pixels: tuple[int, int] | None = PAPER_PIXELS, *, validation: bool = False
+) -> Iterator[NDArray[np.float64]]:
+    """Yield maps of windows `DENSE_STRIDE` apart, on the ground of a blocked fold's training windows alone.
+
+    Parameters
+    ----------
+    field : Field
+    fold : int
+    pixels : tuple of int, optional
+        As for `study_maps`.
+    validation : bool
+        Whether the ground of the validation windows is taken too, for a final model.
+    """
+    values = _pixels(field, pixels)
+    _, held, training = BLOCKED_FOLDS[fold]
+    for first, last in (*training, *held) if validation else training:
+        ground = values[:, STRIDE * first : STRIDE * last + WINDOW]
+        yield pixel_windows(ground, window=WINDOW, stride=DENSE_STRIDE, factor=FACTOR, source=field.source).maps
+
+
+def _pixels(field: Field, pixels: tuple[int, int] | None) -> NDArray[np.float64]:
+    return field.values if pixels is None else resample_bilinear(field.values, pixels)
 
 
 def random_split(maps: MapSet, seed: int) -> Split:

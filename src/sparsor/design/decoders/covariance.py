@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.prior.statistics import Kernel, fit_kernel
+from sparsor.prior.statistics import Kernel, fit_kernel, unit_shapes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,12 +35,11 @@ def unit_kernel(kernel: Kernel, shape: tuple[int, int], allowed: NDArray[np.bool
 
 
 def training_covariance(model: Model, allowed: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the covariance of the training maps and their mirror images, (N, N), centred and scaled.
+    """Return the covariance of the training maps' shapes and their mirror images, (N, N), centred and scaled.
 
-    The mean map counts as one more map, as its amplitude is unknown too. What the factor's components leave of the
-    validation maps is added as an exponential kernel fitted to it.
+    What the factor's components leave of the validation maps is added as an exponential kernel fitted to it.
     """
-    factor = np.column_stack([model.covariance_factor, model.mean])
+    factor = model.covariance_factor
     leading = contrasts(with_symmetries(factor @ factor.T, model.shape), allowed)
     share, residual = _residual(model)
     if share <= _LEAST_RESIDUAL:
@@ -90,18 +89,10 @@ def with_symmetries(covariance: NDArray[np.float64], shape: tuple[int, int]) -> 
 
 def _residual(model: Model) -> tuple[float, Kernel]:
     """Return the share of the validation maps' variance outside the factor's span, and a kernel fitted to it."""
-    basis = np.column_stack([np.ones(model.mean.size), model.mean, model.covariance_factor])
+    basis = np.column_stack([np.ones(model.mean.size), model.covariance_factor])
     axes, spread, _ = np.linalg.svd(basis, full_matrices=False)
     axes = axes[:, spread > _LEAST_RESIDUAL * spread[0]]
     shapes = unit_shapes(model.validation, np.ones(model.mean.size, dtype=np.bool_))
     left = shapes - (shapes @ axes) @ axes.T
     share = float(np.square(left).mean())
     return (share, fit_kernel(left, model.shape)) if share > _LEAST_RESIDUAL else (0.0, model.kernel)
-
-
-def unit_shapes(maps: NDArray[np.float64], allowed: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return maps less their mean, over their spread (allowed cells); maps without contrast are left out."""
-    inside = maps[:, allowed]
-    contrast = np.ptp(inside, axis=1) > 0
-    shifted = maps[contrast] - inside[contrast].mean(axis=1, keepdims=True)
-    return np.asarray(shifted / inside[contrast].std(axis=1, keepdims=True))

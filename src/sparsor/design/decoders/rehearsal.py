@@ -9,8 +9,8 @@ import numpy as np
 
 from sparsor.core.metrics import centred_relative_error
 from sparsor.core.streams import stream
-from sparsor.design.decoders.covariance import unit_shapes
 from sparsor.errors import DesignError
+from sparsor.prior.statistics import unit_shapes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
