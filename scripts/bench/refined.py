@@ -28,7 +28,7 @@ from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
 from sparsor.design import Budget, unit_legs
 from sparsor.design.decoders.covariance import contrasts, kernel_covariance, with_symmetries
-from sparsor.design.refined import DEFAULT_ITERATIONS, Task, refine
+from sparsor.design.refined import DEFAULT_ITERATIONS, Sensor, Task, refine
 from sparsor.design.refined.costs import costs
 from sparsor.design.refined.posterior import belief
 from sparsor.design.refined.starts import pivots, tour_within
@@ -132,8 +132,8 @@ def lawnmower(task, _options):
 
 def qr_pivots(task, _options):
     with one_blas_thread():
-        prior = belief(task.covariance, ALL, rank=128, noise=task.noise)
-        return tour_within(pivots(prior), costs(task.budget, LEGS))
+        prior = belief(task.covariance, ALL, rank=128, noise=task.sensor.noise)
+        return tour_within(pivots(prior, task.sensor.noise), costs(task.budget, LEGS))
 
 
 def refined(task, options):
@@ -171,7 +171,7 @@ def report(planner, folds, limit, sd, metric, options) -> None:
     errors, lengths, seconds = [], [], []
     for fold in folds:
         noise = LEAST_NOISE + sd**2 / fold.sets.training.var(axis=1).mean()
-        task = Task(fold.training["scale-free"], LEGS, Budget(float(limit), "distance"), noise)
+        task = Task(fold.training["scale-free"], LEGS, Budget(float(limit), "distance"), Sensor(noise))
         start = time.perf_counter()
         stops = planner(task, options)
         seconds.append(time.perf_counter() - start)

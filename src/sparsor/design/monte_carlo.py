@@ -106,6 +106,8 @@ class Candidate:
         The visited cells in path order.
     probability, theta : float, int
         What the sample was drawn with.
+    dwells : array of int64 (n,), optional
+        How many holds long the vehicle stays at each stop; None: one at every stop.
     """
 
     sample: int
@@ -117,6 +119,7 @@ class Candidate:
     stops: NDArray[np.int64]
     probability: float
     theta: int
+    dwells: NDArray[np.int64] | None = None
 
 
 @dataclass

@@ -56,7 +56,7 @@ def _seconds_at_any_size(mission: PlannedMission) -> float:
         path_length_m=0.0,
         transit_m=transit_m,
         stops=len(plan.stops),
-        hold_s=plan.stops[0].hold_s,
+        hold_s=[stop.hold_s for stop in plan.stops],
         altitude_m=flight.altitude_m,
         speed_m_s=flight.speed_m_s,
     )

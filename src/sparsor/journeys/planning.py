@@ -28,7 +28,7 @@ from sparsor.geodesy.areas import Area, cells_inside, read_area
 from sparsor.geodesy.lengths import distance_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.modelling import PriorChoice, choose_prior
-from sparsor.journeys.refining import linear_expectation, search_refined
+from sparsor.journeys.refining import refined_task, search_refined
 from sparsor.mission import Home, MissionPlan, build_mission
 from sparsor.vehicle import (
     Autopilot,
@@ -43,7 +43,7 @@ from sparsor.vehicle import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from sparsor.design import Candidate
     from sparsor.design.monte_carlo import Sparsity
@@ -150,7 +150,12 @@ def plan_mission(
     count = workers or os.cpu_count() or 1
     if spec.search.planner == "refined":
         weights = Weights()
-        candidate = search_refined(spec, prior.model, problem, workers=count, progress=progress)
+        speed = _speed(spec, vehicle)
+        hold_s = autopilot.written_hold_s(spec.flight.hold_s)
+        braking_s = stop_seconds(vehicle, hold_s, speed) - hold_s
+        task = refined_task(prior.model, problem, sensor or load_sensor(), hold_s=hold_s, braking_s=braking_s)
+        candidate, error = search_refined(task, spec, prior.model, workers=count, progress=progress)
+        expected = (error, error)
     else:
         sparsity = _sparsity(spec, problem)
         weights = _weights(spec, problem, sparsity)
@@ -164,7 +169,8 @@ def plan_mission(
             workers=count,
             progress=progress,
         )
-    return _assemble(spec, place, prior, vehicle, sensor, autopilot, problem, weights, candidate)
+        expected = expected_errors(problem, candidate, prior.model.mean)
+    return _assemble(spec, place, prior, vehicle, sensor, autopilot, problem, weights, candidate, expected)
 
 
 def _sensor(spec: MissionSpecification) -> SensorProfile | None:
@@ -271,6 +277,7 @@ def _assemble(
     problem: Problem,
     weights: Weights,
     candidate: Candidate,
+    expected: tuple[float, float],
 ) -> PlannedMission:
     candidate = _nearer_end_first(spec, place, candidate)
     flight, stops = spec.flight, candidate.stops
@@ -283,13 +290,9 @@ def _assemble(
         altitude_m=flight.altitude_m,
         home=_home(spec, float(lon[0]), float(lat[0])),
         speed_m_s=flight.speed_m_s,
-        hold_s=flight.hold_s,
+        hold_s=_holds_s(flight.hold_s, candidate, autopilot),
         fence_margin_m=flight.fence_margin_m,
     )
-    if spec.search.planner == "refined":
-        sums = cells = linear_expectation(prior.model, problem.legs, candidate, spec.search.seed)
-    else:
-        sums, cells = expected_errors(problem, candidate, prior.model.mean)
     path_m = problem.legs.path_length(stops)
     transit = distance_m(plan.home.lon_deg, plan.home.lat_deg, lon[[0, -1]], lat[[0, -1]]).sum()
     seconds = flight_seconds(
@@ -297,7 +300,7 @@ def _assemble(
         path_length_m=path_m,
         transit_m=float(transit),
         stops=stops.size,
-        hold_s=autopilot.written_hold_s(flight.hold_s),
+        hold_s=[stop.hold_s for stop in plan.stops],
         altitude_m=flight.altitude_m,
         speed_m_s=_speed(spec, vehicle),
     )
@@ -314,8 +317,8 @@ def _assemble(
         flown_length_m=path_m + float(transit),
         flight_time_s=seconds,
         cells_flown_over=problem.legs.cells_under(stops).size,
-        expected_relative_error=sums * prior.widening,
-        expected_relative_error_cells=cells * prior.widening,
+        expected_relative_error=expected[0] * prior.widening,
+        expected_relative_error_cells=expected[1] * prior.widening,
         warnings=(),
     )
     return replace(mission, warnings=(*advice(mission), *plan.warnings, *prior.warnings))
@@ -326,7 +329,15 @@ def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candi
     if spec.flight.home is None:
         return candidate
     first_m, last_m = distance_m(*spec.flight.home, *place.grid.centres_deg(candidate.stops[[0, -1]]))
-    return replace(candidate, stops=candidate.stops[::-1].copy()) if last_m < first_m else candidate
+    if last_m >= first_m:
+        return candidate
+    dwells = None if candidate.dwells is None else candidate.dwells[::-1].copy()
+    return replace(candidate, stops=candidate.stops[::-1].copy(), dwells=dwells)
+
+
+def _holds_s(hold_s: float, candidate: Candidate, autopilot: Autopilot) -> ArrayLike:
+    """Return the hold at all stops, or at each, seconds."""
+    return hold_s if candidate.dwells is None else autopilot.written_hold_s(hold_s) * candidate.dwells
 
 
 def _home(spec: MissionSpecification, first_lon: float, first_lat: float) -> Home:

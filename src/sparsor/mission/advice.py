@@ -60,7 +60,7 @@ def _speed(plan: MissionPlan, vehicle: Vehicle) -> str:
 
 
 def _hold(plan: MissionPlan, autopilot: Autopilot, wanted_s: float) -> str:
-    written_s = plan.stops[0].hold_s
+    written_s = max(stop.hold_s for stop in plan.stops)
     if written_s == wanted_s:
         return ""
     return f"{autopilot.title} holds for whole seconds: {wanted_s:g} s at each stop is written as {written_s:g} s."

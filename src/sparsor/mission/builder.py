@@ -34,7 +34,7 @@ def build_mission(
     altitude_m: float,
     home: Home | None = None,
     speed_m_s: float | None = None,
-    hold_s: float = 0.0,
+    hold_s: ArrayLike = 0.0,
     fence_margin_m: float = 50.0,
 ) -> MissionPlan:
     """Turn a route into a plan that a multirotor flies from take-off to landing.
@@ -55,8 +55,8 @@ def build_mission(
         Default: the first stop, its altitude unknown.
     speed_m_s : float, optional
         Ground speed along legs; default the vehicle's cruise speed.
-    hold_s : float
-        Time at each stop, seconds. ArduPilot keeps whole seconds: a fraction is rounded up.
+    hold_s : float or array_like (n,)
+        Time at all stops, or at each, seconds. ArduPilot keeps whole seconds: a fraction is rounded up.
     fence_margin_m : float
         Least distance between the flight and its fence, metres.
 
@@ -76,14 +76,17 @@ def build_mission(
     home = _rounded(home or Home(float(lon[0]), float(lat[0])))
     speed = _within("speed", vehicle.cruise_m_s if speed_m_s is None else speed_m_s, MAX_SPEED_M_S, "m/s")
     altitude = _within("altitude", altitude_m, MAX_ALTITUDE_M, "m above home")
-    hold = _checked_hold(hold_s, facts)
+    holds = _checked_holds(hold_s, lon.size, facts)
     _check_count(lon.size, facts)
 
     radius = vehicle.acceptance_radius_m
     items = (
         take_off(home.lon_deg, home.lat_deg, altitude, facts),
         change_speed(speed),
-        *(waypoint(*stop, altitude, hold, radius, facts) for stop in zip(lon, lat, strict=True)),
+        *(
+            waypoint(stop_lon, stop_lat, altitude, hold, radius, facts)
+            for stop_lon, stop_lat, hold in zip(lon, lat, holds, strict=True)
+        ),
         waypoint(home.lon_deg, home.lat_deg, altitude, 0.0, radius, facts),
         land(home.lon_deg, home.lat_deg, facts),
     )
@@ -100,7 +103,7 @@ def build_mission(
         cruise_m_s=speed,
         hover_m_s=speed,
     )
-    return replace(plan, warnings=build_warnings(plan, vehicle, facts, hold_s))
+    return replace(plan, warnings=build_warnings(plan, vehicle, facts, float(np.max(hold_s))))
 
 
 def flight_time_s(plan: MissionPlan, vehicle: Vehicle) -> float:
@@ -125,7 +128,7 @@ def flight_time_s(plan: MissionPlan, vehicle: Vehicle) -> float:
         path_length_m=path_length_m(lon, lat),
         transit_m=float(ends.sum()),
         stops=len(stops),
-        hold_s=stops[0].hold_s,
+        hold_s=[stop.hold_s for stop in stops],
         altitude_m=stops[0].altitude_m,
         speed_m_s=plan.hover_m_s,
     )
@@ -163,10 +166,14 @@ def _within(what: str, value: float, most: float, unit: str) -> float:
     return float(value)
 
 
-def _checked_hold(hold_s: float, autopilot: Autopilot) -> float:
-    if not (math.isfinite(hold_s) and 0 <= hold_s <= autopilot.max_hold_s):
-        raise MissionError(f"a hold of {hold_s:g} s; allowed are 0..{autopilot.max_hold_s} seconds at each stop")
-    return autopilot.written_hold_s(hold_s)
+def _checked_holds(hold_s: ArrayLike, stops: int, autopilot: Autopilot) -> list[float]:
+    given = np.asarray(hold_s, dtype=np.float64)
+    if given.shape not in ((), (stops,)):
+        raise MissionError(f"holds of shape {given.shape} for {stops} stops; give one for all, or one for each")
+    for hold in given.ravel():
+        if not (math.isfinite(hold) and 0 <= hold <= autopilot.max_hold_s):
+            raise MissionError(f"a hold of {hold:g} s; allowed are 0..{autopilot.max_hold_s} seconds at each stop")
+    return [autopilot.written_hold_s(float(hold)) for hold in np.broadcast_to(given, (stops,))]
 
 
 def _check_count(stops: int, autopilot: Autopilot) -> None:

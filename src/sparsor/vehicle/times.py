@@ -8,7 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from sparsor.vehicle.profile import Vehicle
 
 
@@ -56,7 +60,7 @@ def flight_seconds(
     path_length_m: float,
     transit_m: float,
     stops: int,
-    hold_s: float,
+    hold_s: ArrayLike,
     altitude_m: float,
     speed_m_s: float | None = None,
 ) -> float:
@@ -71,9 +75,9 @@ def flight_seconds(
     transit_m : float
         Home to the first stop plus last stop to home, metres.
     stops : int
-        Number of stops, each with `hold_s` seconds of hold.
-    hold_s : float
-        As it is written into the plan (ArduPilot: whole seconds), seconds.
+        Number of stops.
+    hold_s : float or array_like (stops,)
+        Hold at all stops, or at each, as it is written into the plan (ArduPilot: whole seconds), seconds.
     altitude_m : float
         Above home.
     speed_m_s : float, optional
@@ -84,7 +88,7 @@ def flight_seconds(
     return (
         takeoff_seconds(vehicle, altitude_m)
         + leg_seconds(vehicle, path_length_m + transit_m, speed_m_s)
-        + stops * stop_seconds(vehicle, hold_s, speed_m_s)
+        + sum(stop_seconds(vehicle, float(hold), speed_m_s) for hold in np.broadcast_to(hold_s, (stops,)))
         + start_and_end
         + landing_seconds(vehicle, altitude_m)
     )

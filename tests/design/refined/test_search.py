@@ -13,7 +13,7 @@ import shapely
 
 from sparsor.design import Budget, unit_legs
 from sparsor.design.decoders.covariance import kernel_covariance
-from sparsor.design.refined import Task, refine
+from sparsor.design.refined import Sensor, Task, refine
 from sparsor.design.refined.annealing import route_error
 from sparsor.design.refined.costs import costs, used
 from sparsor.design.refined.crossings import crosses
@@ -27,16 +27,18 @@ SHAPE = (12, 12)
 LEGS = unit_legs(SHAPE)
 ALL = np.ones(LEGS.size, dtype=bool)
 LIMIT = 30.0
+SENSOR = Sensor(1e-3)
 
 
-def task(legs=LEGS, budget=None, noise=1e-3, **options):
+def task(legs=LEGS, budget=None, sensor=SENSOR, **options):
     covariance = kernel_covariance(SHAPE, Kernel(1.0, 5.0, 0.0), legs.allowed)
-    return Task(covariance, legs, budget or Budget(LIMIT, "distance"), noise, **options)
+    return Task(covariance, legs, budget or Budget(LIMIT, "distance"), sensor, **options)
 
 
 def expected(one, stops):
     """The error of the last stage's model, as a route states it."""
-    return route_error(belief(one.covariance, one.legs.allowed, rank=128, noise=one.noise), flyover(one.legs), stops)
+    known = belief(one.covariance, one.legs.allowed, rank=128, noise=one.sensor.noise)
+    return route_error(known, flyover(one.legs), one.sensor, stops)
 
 
 def test_the_route_is_within_the_budget_and_better_than_every_start():
@@ -44,7 +46,7 @@ def test_the_route_is_within_the_budget_and_better_than_every_start():
     route = refine(one, seed=0, iterations=4000)
     assert route.used == pytest.approx(LEGS.path_length(route.stops))
     assert route.used <= LIMIT
-    begun = starts(belief(one.covariance, ALL, rank=128, noise=one.noise), costs(one.budget, LEGS), SHAPE)
+    begun = starts(belief(one.covariance, ALL, rank=128, noise=1e-3), costs(one.budget, LEGS), SHAPE, 1e-3)
     assert len(begun) > 4
     assert route.expected_error == pytest.approx(expected(one, route.stops))
     assert route.expected_error < 0.98 * min(expected(one, stops) for stops in begun)
@@ -91,8 +93,22 @@ def test_a_time_budget_counts_stops_and_the_way_home():
     assert used(costs(closed, LEGS), stops) == pytest.approx(closed.used(stops, LEGS))
 
 
-def test_a_slow_sensor_is_flown_with_other_stops_than_a_fast_one():
-    fast, slow = (refine(task(hold_s=20.0, tau_s=tau), seed=0, iterations=2000) for tau in (0.0, 10.0))
+def test_dwells_are_chosen_where_they_pay_and_count_as_way_flown():
+    legs, sensor = unit_legs((3, 3)), Sensor(1e-3, 1.0, 2.0)
+    known = kernel_covariance((3, 3), Kernel(1.0, 1.0, 0.0), legs.allowed)
+    budget = Budget(LIMIT, "distance")  # far more than the nine cells need
+    route = refine(Task(known, legs, budget, sensor, hold_s=1.5), seed=0, iterations=3000)
+    dwells = int((np.diff(route.stops) == 0).sum())
+    assert dwells > 3
+    assert route.used == pytest.approx(legs.path_length(route.stops) + 1.5 * dwells)
+    assert route.used <= LIMIT
+    without = refine(Task(known, legs, budget, sensor), seed=0, iterations=3000)
+    assert (np.diff(without.stops) != 0).all()
+    assert route.expected_error < without.expected_error
+
+
+def test_a_slow_sensor_tells_less_of_the_same_budget():
+    fast, slow = (refine(task(sensor=Sensor(1e-3, 0.0, tau)), seed=0, iterations=2000) for tau in (0.0, 5.0))
     assert slow.expected_error > fast.expected_error
 
 
@@ -124,7 +140,7 @@ def test_with_a_time_to_spend_it_goes_on():
 
 def test_rankings_name_each_cell_once():
     prior = belief(task().covariance, ALL, rank=20, noise=1e-3)
-    for ranking in (pivots(prior), most_telling(prior)):
+    for ranking in (pivots(prior, 1e-3), most_telling(prior, 1e-3)):
         assert np.unique(ranking).size == ranking.size == 21
         assert LEGS.path_length(tour_within(ranking, costs(Budget(LIMIT, "distance"), LEGS))) <= LIMIT
 
@@ -135,4 +151,4 @@ def test_what_cannot_be_searched_is_refused():
     with pytest.raises(DesignError, match="at least 10"):
         refine(task(), seed=0, iterations=3)
     with pytest.raises(DesignError, match="noise is -1"):
-        task(noise=-1.0)
+        task(sensor=Sensor(-1.0))

@@ -9,24 +9,26 @@ from numpy.typing import NDArray  # noqa: TC002
 from sparsor.design.refined.costs import Costs, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.dense import solve
-from sparsor.design.refined.flyover import Flyover, fly, response
+from sparsor.design.refined.flyover import Flyover, passes
 from sparsor.design.refined.moves import propose
 from sparsor.design.refined.posterior import Belief, changed, expected_error, posterior
+from sparsor.design.refined.readings import Readings, Sensor, readings, readings_after
 
-_LEAST_CHANGE = 1e-9
 _MOST_UPDATES = 8  # taking readings away again amplifies rounding: then the posterior is made afresh
 
 
 @njit(cache=True, nogil=True)
-def route_error(prior: Belief, over: Flyover, stops: NDArray[np.int64]) -> float:
+def route_error(prior: Belief, over: Flyover, sensor: Sensor, stops: NDArray[np.int64]) -> float:
     """Return the expected error of the route over `stops`: the mean posterior variance over the cells that count."""
-    return expected_error(prior, posterior(prior, _shares(over, stops, prior.precision.size)[2]))
+    cell, seconds = passes(over, stops)
+    return expected_error(prior, _afresh(prior, sensor, readings(prior, sensor, cell, seconds)))
 
 
 @njit(cache=True, nogil=True)
 def anneal(
     prior: Belief,
     over: Flyover,
+    sensor: Sensor,
     costs: Costs,
     start: NDArray[np.int64],
     temperatures: NDArray[np.float64],
@@ -41,6 +43,7 @@ def anneal(
     ----------
     prior : Belief
     over : Flyover
+    sensor : Sensor
     costs : Costs
     start : array of int64 (n,)
         Stops of a route within the budget.
@@ -54,54 +57,56 @@ def anneal(
         The last route, the best one and the best one's expected error.
     """
     stops = start.copy()
-    passes, seconds, share = _shares(over, stops, prior.precision.size)
-    covariance = posterior(prior, share)
+    cell, seconds = passes(over, stops)
+    known = readings(prior, sensor, cell, seconds)
+    covariance = _afresh(prior, sensor, known)
     error = expected_error(prior, covariance)
     best, best_error, updates = stops, error, 0
     for temperature in temperatures:
-        trial = propose(stops, prior.precision, over.columns, rng)
+        trial = propose(stops, prior.allowed, over.columns, over.hold_s > 0, rng)
         if trial.size < 2 or used(costs, trial) > costs.limit:
             continue
         head, tail = _unchanged(stops, trial)
         if crosses(trial, costs.legs, over.columns, head, trial.size - 1 - tail):
             continue
-        before, after = stops[head : stops.size - tail], trial[head : trial.size - tail]
-        fly(over, before, -1, passes, seconds)
-        fly(over, after, 1, passes, seconds)
-        touched, difference = _differences(over, passes, seconds, share)
-        rise, left, inner = 0.0, covariance, covariance  # for a change of order alone
-        if touched.size:
-            rise, left, inner = changed(prior, covariance, touched, difference)
-        if rise > error * np.expm1(-temperature * np.log(1.0 - rng.random())):
-            fly(over, after, -1, passes, seconds)
-            fly(over, before, 1, passes, seconds)
+        cell, seconds = passes(over, trial)
+        made, rows, difference = readings_after(prior, sensor, cell, seconds, known)
+        if not difference.size:  # a change of order alone
+            stops, known = trial, made
             continue
-        stops = trial
-        if not touched.size:
-            continue
-        share[touched] += difference
-        error += rise
-        updates += 1
-        if error < best_error or updates % _MOST_UPDATES == 0:
-            covariance = posterior(prior, share)
+        most_rise = error * np.expm1(-temperature * np.log(1.0 - rng.random()))
+        if difference.size > prior.spread.size:  # an update would cost more than starting afresh
+            fresh = _afresh(prior, sensor, made)
+            if expected_error(prior, fresh) - error > most_rise:
+                continue
+            stops, known, covariance, updates = trial, made, fresh, 0
             error = expected_error(prior, covariance)
         else:
-            covariance -= np.dot(np.ascontiguousarray(left.T), solve(inner, left))
+            rise, left, inner = changed(prior, covariance, rows, difference)
+            if rise > most_rise:
+                continue
+            stops, known, error = trial, made, error + rise
+            updates += 1
+            if error < best_error or updates == _MOST_UPDATES:
+                known = readings(prior, sensor, cell, seconds)
+                covariance, updates = _afresh(prior, sensor, known), 0
+                error = expected_error(prior, covariance)
+            else:
+                covariance -= np.dot(np.ascontiguousarray(left.T), solve(inner, left))
         if error < best_error:
             best, best_error = stops, error
     return stops, best, best_error
 
 
 @njit(cache=True, nogil=True)
-def _shares(
-    over: Flyover, stops: NDArray[np.int64], cells: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return how often a route passes over each cell, for how long, and the share of its information that gives."""
-    passes, seconds, share = np.zeros(cells, dtype=np.int64), np.zeros(cells), np.zeros(cells)
-    fly(over, stops, 1, passes, seconds)
-    touched, difference = _differences(over, passes, seconds, share)
-    share[touched] += difference
-    return passes, seconds, share
+def _afresh(prior: Belief, sensor: Sensor, known: Readings) -> NDArray[np.float64]:
+    """Return the posterior covariance of the coefficients after all readings."""
+    rows = known.row
+    if sensor.tau_s == 0.0:
+        rows = np.empty((known.cell.size, prior.spread.size))
+        for k in range(known.cell.size):
+            rows[k] = prior.factor[known.cell[k]]
+    return posterior(prior, rows, known.precision)
 
 
 @njit(cache=True, nogil=True)
@@ -115,21 +120,3 @@ def _unchanged(stops: NDArray[np.int64], trial: NDArray[np.int64]) -> tuple[int,
     while tail < most - head and stops[stops.size - 1 - tail] == trial[trial.size - 1 - tail]:
         tail += 1
     return max(head - 1, 0), max(tail - 1, 0)
-
-
-@njit(cache=True, nogil=True)
-def _differences(
-    over: Flyover, passes: NDArray[np.int64], seconds: NDArray[np.float64], share: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the cells whose share is no longer the one given, and by how much it differs."""
-    cells, difference = np.empty(share.size, dtype=np.int64), np.empty(share.size)
-    count = 0
-    for cell in range(share.size):
-        if passes[cell] == 0:
-            seconds[cell] = 0.0  # what rounding left there
-        change = response(passes[cell], seconds[cell], over.tau_s) - share[cell]
-        if abs(change) > _LEAST_CHANGE:
-            cells[count] = cell
-            difference[count] = change
-            count += 1
-    return cells[:count], difference[:count]

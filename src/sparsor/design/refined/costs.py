@@ -19,7 +19,7 @@ class Costs(NamedTuple):
     Parameters
     ----------
     legs : array of float64 (N, N)
-        Metres, cell widths or seconds; symmetric.
+        Metres, cell widths or seconds; symmetric. On the diagonal: one dwell.
     ends : array of float64 (N,)
         The way between home and each cell.
     closing : float
@@ -35,10 +35,15 @@ class Costs(NamedTuple):
     limit: float
 
 
-def costs(budget: Budget, legs: LegTable) -> Costs:
-    """Return a budget for the legs of a table."""
+def costs(budget: Budget, legs: LegTable, dwell_s: float = 0.0) -> Costs:
+    """Return a budget for the legs of a table and dwells of `dwell_s`, braking included.
+
+    To a budget of distance a dwell counts as the way that would have been flown meanwhile: what is short in the air is
+    energy, and that goes by time.
+    """
     distance = budget.measure == "distance"
-    table = np.ascontiguousarray(legs.length if distance else legs.seconds)
+    table = (legs.length if distance else legs.seconds).copy()
+    np.fill_diagonal(table, dwell_s * (legs.length.sum() / legs.seconds.sum() if distance else 1.0))
     ends = np.zeros(legs.size) if distance or budget.home is None else np.ascontiguousarray(budget.home)
     closing = float(not distance and budget.home is None)
     return Costs(table, ends, closing, float(budget.per_stop), float(budget.fixed), float(budget.limit))

@@ -1,4 +1,4 @@
-"""What a route measures of each cell: everything under its legs, as far as the sensor answers in time."""
+"""What a route flies over: the cells under its legs, one pass after the other, and how long each takes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ class Flyover(NamedTuple):
     seconds : array of float64 (N, N)
         Time of flight of each leg.
     hold_s : float
-        Dwell at each stop.
-    tau_s : float
-        Time constant of the first-order sensor; 0 answers at once.
+        Dwell at a stop that follows itself; 0 where routes have none.
     """
 
     columns: int
@@ -38,46 +36,45 @@ class Flyover(NamedTuple):
     share: NDArray[np.float64]
     seconds: NDArray[np.float64]
     hold_s: float = 0.0
-    tau_s: float = 0.0
 
 
-def flyover(legs: LegTable, *, hold_s: float = 0.0, tau_s: float = 0.0) -> Flyover:
-    """Return the cells under the legs of a table, for a dwell at each stop and a sensor's time constant."""
-    return Flyover(
-        legs.shape[1], *crossing_table(legs.shape), np.ascontiguousarray(legs.seconds), float(hold_s), float(tau_s)
-    )
+def flyover(legs: LegTable, *, hold_s: float = 0.0) -> Flyover:
+    """Return the cells under the legs of a table, for one dwell of `hold_s`."""
+    return Flyover(legs.shape[1], *crossing_table(legs.shape), np.ascontiguousarray(legs.seconds), float(hold_s))
 
 
 @njit(cache=True, nogil=True)
-def fly(
-    over: Flyover, stops: NDArray[np.int64], sign: int, passes: NDArray[np.int64], seconds: NDArray[np.float64]
-) -> None:
-    """Add a path over `stops` to the passes over each cell and the seconds spent there; -1 takes it away."""
+def passes(over: Flyover, stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the cells that a route passes through, in order, and the seconds in each.
+
+    A stop that is given twice in a row is dwelt at.
+    """
+    count = 1
+    for k in range(stops.size - 1):
+        offset = _offset(over, stops[k], stops[k + 1])
+        count += over.first[offset + 1] - over.first[offset]
+    cell, seconds = np.empty(count, dtype=np.int64), np.zeros(count)
+    cell[0] = stops[0]
+    last = 0
     for k in range(stops.size - 1):
         start, end = stops[k], stops[k + 1]
+        if start == end:
+            seconds[last] += over.hold_s
+            continue
         row, column = start // over.columns, start % over.columns
-        down, across = end // over.columns - row, end % over.columns - column
-        down_sign = 1 if down >= 0 else -1
-        across_sign = 1 if across >= 0 else -1
-        offset = abs(down) * over.columns + abs(across)
-        time = over.seconds[start, end]
+        down = 1 if end // over.columns >= row else -1
+        across = 1 if end % over.columns >= column else -1
+        offset, time = _offset(over, start, end), over.seconds[start, end]
         for i in range(over.first[offset], over.first[offset + 1]):
-            cell = (row + down_sign * over.rows_off[i]) * over.columns + column + across_sign * over.columns_off[i]
-            passes[cell] += sign
-            seconds[cell] += sign * over.share[i] * time
-    for stop in stops:
-        seconds[stop] += sign * over.hold_s
+            under = (row + down * over.rows_off[i]) * over.columns + column + across * over.columns_off[i]
+            if under != cell[last]:
+                last += 1
+                cell[last] = under
+            seconds[last] += over.share[i] * time
+    return cell[: last + 1], seconds[: last + 1]
 
 
 @njit(cache=True, nogil=True)
-def response(passes: int, seconds: float, tau_s: float) -> float:
-    """Return how much of a cell's information the sensor took in, 0..1.
-
-    A first-order sensor reads ``1 - exp(-t / tau)`` of the cell after t seconds; the square of that share is what it
-    is worth, as a reading's noise counts in full.
-    """
-    if passes == 0:
-        return 0.0
-    if tau_s == 0.0:
-        return 1.0
-    return float(np.expm1(-seconds / tau_s) ** 2)
+def _offset(over: Flyover, start: int, end: int) -> int:
+    down = abs(end // over.columns - start // over.columns)
+    return int(down * over.columns + abs(end % over.columns - start % over.columns))

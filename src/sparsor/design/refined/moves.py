@@ -15,20 +15,22 @@ _REACHES = np.array([1.0, 1.0, 2.0, 4.0])  # cells, standard deviation of a new 
 
 @njit(cache=True, nogil=True)
 def propose(
-    stops: NDArray[np.int64], open_cells: NDArray[np.float64], columns: int, rng: np.random.Generator
+    stops: NDArray[np.int64], open_cells: NDArray[np.bool_], columns: int, dwell: bool, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Return a changed copy of a route.
 
     One to three of: move a stop, move two neighbours alike, insert a stop beside a leg or beyond an end, delete one,
-    give it another place in the order, and turn a stretch round. Budgets are mostly used up, so an insertion alone
-    rarely fits, but together with what frees its length it does.
+    give it another place in the order, and turn a stretch round; where a route may dwell, also give a stop once more.
+    Budgets are mostly used up, so an insertion alone rarely fits, but together with what frees its length it does.
 
     Parameters
     ----------
     stops : array of int64 (n,)
-    open_cells : array of float64 (N,)
-        Above 0 where a stop may lie.
+    open_cells : array of bool (N,)
+        Where a stop may lie.
     columns : int
+    dwell : bool
+        Whether a stop may follow itself.
     rng : numpy.random.Generator
     """
     trial = stops
@@ -39,7 +41,10 @@ def propose(
         if kind < 4:
             trial = _moved(trial, at, 2 if kind == 3 else 1, reach, open_cells, columns, rng)
         elif kind < 6:
-            trial = _inserted(trial, reach, open_cells, columns, rng)
+            if dwell and kind == 4:
+                trial = np.concatenate((trial[: at + 1], trial[at:]))
+            else:
+                trial = _inserted(trial, reach, open_cells, columns, rng)
         elif kind < 8 and trial.size > 2:
             trial = np.concatenate((trial[:at], trial[at + 1 :]))
         elif kind == 8:
@@ -55,7 +60,7 @@ def _moved(
     at: int,
     count: int,
     reach: float,
-    open_cells: NDArray[np.float64],
+    open_cells: NDArray[np.bool_],
     columns: int,
     rng: np.random.Generator,
 ) -> NDArray[np.int64]:
@@ -72,7 +77,7 @@ def _moved(
 
 @njit(cache=True, nogil=True)
 def _inserted(
-    stops: NDArray[np.int64], reach: float, open_cells: NDArray[np.float64], columns: int, rng: np.random.Generator
+    stops: NDArray[np.int64], reach: float, open_cells: NDArray[np.bool_], columns: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Insert a stop near a point of a leg, or near an end."""
     at = int(rng.integers(0, stops.size + 1))  # in front of this position
@@ -87,12 +92,12 @@ def _inserted(
 
 
 @njit(cache=True, nogil=True)
-def _place(row: int, column: int, open_cells: NDArray[np.float64], columns: int) -> int:
+def _place(row: int, column: int, open_cells: NDArray[np.bool_], columns: int) -> int:
     """Return the cell, or -1 when it is outside."""
     if row < 0 or column < 0 or column >= columns or row * columns + column >= open_cells.size:
         return -1
     cell = row * columns + column
-    return cell if open_cells[cell] > 0 else -1
+    return cell if open_cells[cell] else -1
 
 
 @njit(cache=True, nogil=True)

@@ -30,14 +30,17 @@ class Belief(NamedTuple):
         Variance of each coefficient.
     size : array of float64 (r + 1,)
         Mean square of each column over the cells that count.
-    precision : array of float64 (N,)
-        One over the variance of a reading around what the factor says.
+    residual : array of float64 (N,)
+        Variance of a cell around what the factor says.
+    allowed : array of bool (N,)
+        Cells that count and may be flown.
     """
 
     factor: NDArray[np.float64]
     spread: NDArray[np.float64]
     size: NDArray[np.float64]
-    precision: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    allowed: NDArray[np.bool_]
 
 
 def belief(
@@ -54,34 +57,42 @@ def belief(
     rank : int
         Most components.
     noise : float
-        Variance of a reading, in the unit of the covariance.
+        Variance of a reading, in the unit of the covariance: components that say less than this of all cells together
+        cannot be told from it and are left out.
     """
     cells = np.flatnonzero(allowed)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
     leading = values.argsort()[::-1][:rank]
-    leading = leading[values[leading] > _LEAST_NOISE * values.max()]
+    leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), noise)]
     # The signs that LAPACK gives are its own; they do not change any result.
     inside = vectors[:, leading] * np.sqrt(values[leading])
     left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
     factor = np.zeros((allowed.size, leading.size + 1))
     factor[cells, :-1] = inside
     factor[cells, -1] = 1.0
-    precision = np.zeros(allowed.size)
-    precision[cells] = 1 / (left + noise + _LEAST_NOISE)
+    residual = np.zeros(allowed.size)
+    residual[cells] = left + _LEAST_NOISE
     spread = np.append(np.ones(leading.size), _LEVEL_VARIANCE)
-    return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, precision)
+    return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, residual, allowed)
 
 
 @njit(cache=True, nogil=True)
-def posterior(prior: Belief, share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the covariance of the coefficients after each cell was read with a share of its precision, (r+1, r+1)."""
-    cells = np.flatnonzero(share)
-    readings = np.empty((prior.spread.size, cells.size))
-    for k in range(cells.size):
-        scale = np.sqrt(share[cells[k]] * prior.precision[cells[k]])
+def posterior(prior: Belief, rows: NDArray[np.float64], precision: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of the coefficients after readings, (r+1, r+1).
+
+    Parameters
+    ----------
+    prior : Belief
+    rows : array of float64 (n, r + 1)
+        Of the factor, as each reading mixes it.
+    precision : array of float64 (n,)
+    """
+    scaled = np.empty((prior.spread.size, precision.size))
+    for k in range(precision.size):
+        scale = np.sqrt(precision[k])
         for j in range(prior.spread.size):
-            readings[j, k] = scale * prior.factor[cells[k], j]
-    information = np.dot(readings, readings.T)
+            scaled[j, k] = scale * rows[k, j]
+    information = np.dot(scaled, scaled.T)
     for j in range(prior.spread.size):
         information[j, j] += 1 / prior.spread[j]
     return inverse(information)
@@ -98,18 +109,23 @@ def expected_error(prior: Belief, covariance: NDArray[np.float64]) -> float:
 
 @njit(cache=True, nogil=True)
 def changed(
-    prior: Belief, covariance: NDArray[np.float64], cells: NDArray[np.int64], difference: NDArray[np.float64]
+    prior: Belief, covariance: NDArray[np.float64], rows: NDArray[np.float64], difference: NDArray[np.float64]
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Return what a change of the cells' shares does to the expected error, and the update that makes it.
+    """Return what a change of readings does to the expected error, and the update that makes it.
 
     By the Woodbury identity the posterior covariance P becomes ``P - left.T @ inv(inner) @ left``.
+
+    Parameters
+    ----------
+    prior : Belief
+    covariance : array of float64 (r + 1, r + 1)
+    rows : array of float64 (k, r + 1)
+    difference : array of float64 (k,)
+        Of their precision; below 0 where readings are taken away.
     """
-    rows = np.empty((cells.size, prior.spread.size))
-    for i in range(cells.size):
-        rows[i] = prior.factor[cells[i]]
     left = np.dot(rows, covariance)
     inner = inner_products(left, rows)
-    for i in range(cells.size):
-        inner[i, i] += 1 / (difference[i] * prior.precision[cells[i]])
+    for i in range(difference.size):
+        inner[i, i] += 1 / difference[i]
     explained = solve(inner, inner_products(left * prior.size, left))
     return -float(np.trace(explained)), left, inner

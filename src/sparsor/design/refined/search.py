@@ -21,8 +21,9 @@ from sparsor.core.workers import one_blas_thread
 from sparsor.design.refined.annealing import anneal, route_error
 from sparsor.design.refined.costs import costs, used
 from sparsor.design.refined.crossings import crosses
-from sparsor.design.refined.flyover import flyover
+from sparsor.design.refined.flyover import flyover, passes
 from sparsor.design.refined.posterior import belief
+from sparsor.design.refined.readings import Sensor, weights
 from sparsor.design.refined.starts import starts
 from sparsor.errors import BudgetError, DesignError
 
@@ -55,6 +56,9 @@ class _Stage:
 _STAGES = (_Stage(64, 2, 0.1, 0.003), _Stage(128, 2, 0.003, 0.0003))
 
 
+_EXACT = Sensor(0.0)
+
+
 @dataclass(frozen=True)
 class Task:
     """What the search is given.
@@ -65,27 +69,32 @@ class Task:
         Of maps of amplitude 1, differences from their mean; see `decoders.covariance`.
     legs : LegTable
     budget : Budget
-    noise : float
-        Variance of a reading, maps having a mean variance of 1.
-    hold_s, tau_s : float
-        Dwell at each stop and the sensor's time constant; 0: it answers at once.
+    sensor : Sensor
+        Its noise for maps of a mean variance of 1.
+    hold_s : float
+        A dwell, which a route may make at any stop, several times over; 0: none.
+    braking_s : float
+        What a dwell takes beside that.
     """
 
     covariance: NDArray[np.float64]
     legs: LegTable
     budget: Budget
-    noise: float = 0.0
+    sensor: Sensor = _EXACT
     hold_s: float = 0.0
-    tau_s: float = 0.0
+    braking_s: float = 0.0
 
     def __post_init__(self) -> None:
         size = self.legs.size
         if self.covariance.shape != (size, size):
             raise DesignError(f"a covariance of shape {self.covariance.shape} does not fit a grid of {size} cells")
-        for name in ("noise", "hold_s", "tau_s"):
-            value = getattr(self, name)
+        for name, value in {**self.sensor._asdict(), "hold_s": self.hold_s, "braking_s": self.braking_s}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
+
+    def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
+        return weights(self.sensor, *passes(flyover(self.legs, hold_s=self.hold_s), stops), self.legs.size)
 
 
 @dataclass(frozen=True)
@@ -95,7 +104,8 @@ class Route:
     Parameters
     ----------
     stops : array of int64 (n,)
-        Turning points in path order; every cell under the legs between them is measured.
+        Turning points in path order; every cell under the legs between them is measured. At one that follows itself
+        the vehicle dwells.
     expected_error : float
         Mean posterior variance over the allowed cells as a share of the maps' variance.
     used : float
@@ -167,9 +177,10 @@ class _Search:
     ) -> None:
         allowed = task.legs.allowed
         self.task, self.seed, self.moves, self.workers, self.progress = task, seed, iterations, workers, progress
-        self.over_cells = flyover(task.legs, hold_s=task.hold_s, tau_s=task.tau_s)
-        self.costs = costs(task.budget, task.legs)
-        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, noise=task.noise) for one in _STAGES]
+        self.over_cells = flyover(task.legs, hold_s=task.hold_s)
+        self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
+        noise = task.sensor.noise
+        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, noise=noise) for one in _STAGES]
         self.begun, self.seconds = time.monotonic(), seconds
         self.interrupted = Event()
         self.done, self.lock = 0, Lock()
@@ -182,7 +193,7 @@ class _Search:
 
     def from_starts(self, begin: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Return the best route that all stages find from the starts."""
-        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape)]
+        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape, self.task.sensor.noise)]
         routes = [stops for stops in routes if self.fits(stops)]
         if not routes:
             say = self.task.budget.describe
@@ -203,7 +214,7 @@ class _Search:
         return not crosses(stops, self.costs.legs, self.over_cells.columns, 0, stops.size - 1)
 
     def error(self, stops: NDArray[np.int64], level: int) -> float:
-        return float(route_error(self.beliefs[level], self.over_cells, stops))
+        return float(route_error(self.beliefs[level], self.over_cells, self.task.sensor, stops))
 
     def ranked(self, routes: list[NDArray[np.int64]], level: int) -> list[NDArray[np.int64]]:
         """Return routes by their expected error, the lowest first; ties stay in order."""
@@ -229,7 +240,9 @@ class _Search:
             if self.over:
                 break
             piece = temperatures[first : first + _PIECE]
-            stops, reached, error = anneal(self.beliefs[level], self.over_cells, self.costs, stops, piece, rng)
+            stops, reached, error = anneal(
+                self.beliefs[level], self.over_cells, self.task.sensor, self.costs, stops, piece, rng
+            )
             if error < lowest:
                 best, lowest = reached, error
             self.tell(piece.size)

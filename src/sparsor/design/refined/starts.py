@@ -19,38 +19,40 @@ if TYPE_CHECKING:
 
 _MOST_LINES = 16
 _INSETS = 8
+_ROUNDING = 1e-12
 
 
-def starts(prior: Belief, costs: Costs, shape: tuple[int, int]) -> list[NDArray[np.int64]]:
+def starts(prior: Belief, costs: Costs, shape: tuple[int, int], noise: float) -> list[NDArray[np.int64]]:
     """Return routes within the budget, each of another kind: lawnmowers, and tours of ranked cells."""
     found = [*_lawnmowers(prior, costs, shape)]
-    for ranking in (pivots(prior), most_telling(prior)):
+    for ranking in (pivots(prior, noise), most_telling(prior, noise)):
         tour = tour_within(ranking, costs)
         if tour is not None:
             found.append(tour)
     return found
 
 
-def pivots(prior: Belief) -> NDArray[np.int64]:
+def pivots(prior: Belief, noise: float) -> NDArray[np.int64]:
     """Return cells by the pivots of a QR decomposition of the components (Manohar et al. 2018)."""
     from scipy.linalg import qr
 
     rank = prior.spread.size
-    order = qr((prior.factor * np.sqrt(prior.precision)[:, None]).T, mode="r", pivoting=True)[1][:rank]
-    return np.asarray(order[prior.precision[order] > 0], dtype=np.int64)
+    scale = np.where(prior.allowed, 1 / np.sqrt(prior.residual + noise + _ROUNDING), 0.0)
+    order = qr((prior.factor * scale[:, None]).T, mode="r", pivoting=True)[1][:rank]
+    return np.asarray(order[prior.allowed[order]], dtype=np.int64)
 
 
-def most_telling(prior: Belief) -> NDArray[np.int64]:
+def most_telling(prior: Belief, noise: float) -> NDArray[np.int64]:
     """Return cells in the order that lowers the expected error most with each one (greedy A-optimal design)."""
     covariance = np.diag(prior.spread)
     order: list[int] = []
-    free = prior.precision > 0
-    noise = 1 / np.where(free, prior.precision, 1.0)
+    free = prior.allowed.copy()
+    variance = prior.residual + noise + _ROUNDING
     for _ in range(min(prior.spread.size, int(free.sum()))):
         towards = prior.factor @ covariance
-        gain = (np.square(towards) @ prior.size) / ((towards * prior.factor).sum(axis=1) + noise)
+        gain = (np.square(towards) @ prior.size) / ((towards * prior.factor).sum(axis=1) + variance)
         cell = int(np.where(free, gain, -1.0).argmax())
-        covariance -= np.outer(towards[cell], towards[cell]) / (towards[cell] @ prior.factor[cell] + noise[cell])
+        covariance -= np.outer(towards[cell], towards[cell]) / (towards[cell] @ prior.factor[cell] + variance[cell])
         free[cell] = False
         order.append(cell)
     return np.array(order, dtype=np.int64)
@@ -69,7 +71,7 @@ def tour_within(ranking: NDArray[np.int64], costs: Costs) -> NDArray[np.int64] |
 
 def _lawnmowers(prior: Belief, costs: Costs, shape: tuple[int, int]) -> Iterator[NDArray[np.int64]]:
     """Yield, of every number of lines, the widest lawnmower within the budget: along rows, and along columns."""
-    cells = np.flatnonzero(prior.precision > 0)
+    cells = np.flatnonzero(prior.allowed)
     row, column = np.divmod(cells, shape[1])
     for across, along in ((row, column), (column, row)):
         for lines in range(1, _MOST_LINES + 1):
