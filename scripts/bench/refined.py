@@ -132,7 +132,7 @@ def lawnmower(task, _options):
 
 def qr_pivots(task, _options):
     with one_blas_thread():
-        prior = belief(task.covariance, ALL, rank=128, noise=task.sensor.noise)
+        prior = belief(task.covariance, ALL, rank=128, least=task.least_telling)
         return tour_within(pivots(prior, task.sensor.noise), costs(task.budget, LEGS))
 
 

@@ -113,7 +113,7 @@ class Budget:
     def stops_within(self, legs: LegTable) -> int:
         """Return about how many random cells a route within the budget can visit; at least 2."""
         table = legs.length if self.measure == "distance" else legs.seconds
-        step = float(np.sqrt(table[0, 1] * table[0, legs.shape[1]]))  # side of a square as large as a cell
+        step = legs.step(table)
         count = np.arange(2, max(3, int(legs.allowed.sum()) + 1))
         tour = _TOUR_CONSTANT * np.sqrt(count * legs.allowed.sum()) * step
         used = self.fixed + tour + self.per_stop * count

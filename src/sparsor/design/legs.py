@@ -77,6 +77,12 @@ class LegTable:
             longest=longest,
         )
 
+    def step(self, table: NDArray[np.float64]) -> float:
+        """Return what a step of one cell costs by `length` or `seconds`: the side of a square as large as a cell."""
+        # Legs out of the area cost more than all others: the least is that of a step inside.
+        across, down = np.diagonal(table, 1).min(), np.diagonal(table, self.shape[1]).min()
+        return float(np.sqrt(across * down))
+
     def leaves(self, stops: NDArray[np.int64]) -> bool:
         """Return whether a path over `stops` leaves the allowed cells; known after `kept_inside`."""
         return self.path_length(stops) > self.longest

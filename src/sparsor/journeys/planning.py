@@ -30,6 +30,7 @@ from sparsor.journeys.advice import advice
 from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.journeys.refining import refined_task, search_refined
 from sparsor.mission import Home, MissionPlan, build_mission
+from sparsor.mission.specification import PAPER_ROWS
 from sparsor.vehicle import (
     Autopilot,
     SensorProfile,
@@ -71,7 +72,7 @@ class PlannedMission:
     prior : PriorChoice
     vehicle : Vehicle
     sensor : SensorProfile or None
-        None when nothing was said of it.
+        None when nothing was said of it and the planner does without.
     candidate : Candidate
         The winner of the search.
     weights : Weights
@@ -153,7 +154,8 @@ def plan_mission(
         speed = _speed(spec, vehicle)
         hold_s = autopilot.written_hold_s(spec.flight.hold_s)
         braking_s = stop_seconds(vehicle, hold_s, speed) - hold_s
-        task = refined_task(prior.model, problem, sensor or load_sensor(), hold_s=hold_s, braking_s=braking_s)
+        assert sensor is not None
+        task = refined_task(prior.model, problem, sensor, hold_s=hold_s, braking_s=braking_s)
         candidate, error = search_refined(task, spec, prior.model, workers=count, progress=progress)
         expected = (error, error)
     else:
@@ -174,8 +176,9 @@ def plan_mission(
 
 
 def _sensor(spec: MissionSpecification) -> SensorProfile | None:
+    """Return the sensor; the refined search plans for the packaged one where nothing is said, Algorithm 1 for none."""
     if spec.sensor is None:
-        return None
+        return load_sensor() if spec.search.planner == "refined" else None
     if spec.sensor.profile is not None:
         return load_sensor(spec.sensor.profile)
     return load_sensor().model_copy(update={"t90_s": spec.sensor.t90_s})
@@ -232,13 +235,14 @@ def _budget(spec: MissionSpecification, vehicle: Vehicle, autopilot: Autopilot, 
 
 def _problem(spec: MissionSpecification, prior: PriorChoice, legs: LegTable, budget: Budget | None) -> Problem:
     model, asked = prior.model, spec.search
-    check_sparsity(asked.probability, asked.theta, asked.rows)
+    rows = asked.rows or PAPER_ROWS
+    check_sparsity(asked.probability, asked.theta, rows)
     return Problem(
         psi=model.dictionary,
         maps=model.validation - model.mean,
         lasso_weight=model.lasso_weight if asked.lasso is None else asked.lasso,
         legs=legs,
-        rows=asked.rows,
+        rows=rows,
         budget=budget,
         unit_rows=not asked.paper,
         improve=not asked.paper,
@@ -258,13 +262,14 @@ def _sparsity(spec: MissionSpecification, problem: Problem) -> Sparsity:
 def _weights(spec: MissionSpecification, problem: Problem, sparsity: Sparsity) -> Weights:
     """Within a budget the path and the incoherence cost nothing unless their weights are given."""
     asked = spec.search
+    valid = 1.0 if asked.lambda_valid is None else asked.lambda_valid
     path, incoherence = asked.lambda_path, asked.lambda_incoh
     if problem.budget is not None:
         path, incoherence = path or 0.0, incoherence or 0.0
     if path is not None and incoherence is not None:
-        return comparable_weights([], valid=asked.lambda_valid, path=path, incoherence=incoherence)
+        return comparable_weights([], valid=valid, path=path, incoherence=incoherence)
     drawn = pilot(problem, sparsity, seed=asked.seed)
-    return comparable_weights(drawn, valid=asked.lambda_valid, path=path, incoherence=incoherence)
+    return comparable_weights(drawn, valid=valid, path=path, incoherence=incoherence)
 
 
 def _assemble(

@@ -6,7 +6,7 @@ import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import tomli_w
 from pydantic import (
@@ -21,6 +21,9 @@ from pydantic import (
 
 from sparsor.errors import MissionError
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 Export = Literal["waypoints", "kml", "geojson"]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -28,9 +31,14 @@ Longitude = Annotated[FiniteFloat, Field(ge=-180, le=180)]
 Latitude = Annotated[FiniteFloat, Field(ge=-85, le=85)]
 
 HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same mission again.\n"
-PAPER_PROBABILITY, PAPER_THETA = 0.03, 3
+PAPER_ROWS, PAPER_PROBABILITY, PAPER_THETA = 35, 0.03, 3
+ALGORITHM_1_ITERATIONS = 4000
 DEFAULT_BUDGET = "10%"
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
+# Settings that only Algorithm 1 knows: who gives one asks for it.
+_ALGORITHM_1 = frozenset(
+    ("paper", "rows", "probability", "theta", "lasso", "lambda_valid", "lambda_path", "lambda_incoh")
+)
 
 
 class _Section(BaseModel):
@@ -82,32 +90,33 @@ class PriorSection(_Section):
 class SearchSection(_Section):
     """The search's settings; of Algorithm 1 those left out are searched (p, theta) or chosen (lambdas)."""
 
-    planner: Literal["monte-carlo", "refined"] = "monte-carlo"
+    planner: Literal["refined", "monte-carlo"]
     paper: bool = False
-    rows: Annotated[int, Field(ge=1, le=1024)] = 35
+    rows: Annotated[int, Field(ge=1, le=1024)] | None = None
     probability: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
     theta: Annotated[int, Field(ge=0)] | None = None
     lasso: Positive | None = None
-    lambda_valid: NotNegative = 1.0
+    lambda_valid: NotNegative | None = None
     lambda_path: NotNegative | None = None
     lambda_incoh: NotNegative | None = None
-    iterations: Annotated[int, Field(ge=1, le=100_000_000)] = 4000
+    iterations: Annotated[int, Field(ge=1, le=100_000_000)]
     time_s: Positive | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     budget: str | None = None
 
     @model_validator(mode="after")
     def _theta_within_rows(self) -> Self:
-        if self.theta is not None and self.theta > self.rows:
+        if self.theta is not None and self.rows is not None and self.theta > self.rows:
             raise ValueError(f"theta is {self.theta}; it has to be 0..{self.rows}, the number of rows of Phi")
         return self
 
     @model_validator(mode="after")
-    def _refined_within_a_budget(self) -> Self:
-        if self.planner == "refined" and (self.paper or self.budget is None):
+    def _refined_on_its_own(self) -> Self:
+        foreign = _of_algorithm_1({name: getattr(self, name) for name in _ALGORITHM_1})
+        if self.planner == "refined" and foreign:
             raise ValueError(
-                "the refined planner searches within a budget and knows no lambda_path and no --paper: give a budget, "
-                "like 10%, or take the monte-carlo planner"
+                f"{', '.join(foreign)}: the refined planner does not know what only Algorithm 1 has; leave it out, or "
+                "take the monte-carlo planner"
             )
         return self
 
@@ -123,19 +132,25 @@ class SearchSection(_Section):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, given: Any) -> Any:  # noqa: ANN401 (pydantic hands over whatever was given)
-        """Fill in what `--paper` and the missing budget imply, so that mission.toml states it."""
+        """Fill in what the planner, `--paper` and the missing budget imply, so that mission.toml states it."""
         if not isinstance(given, dict):
             return given
         filled = {key: value for key, value in given.items() if value is not None}
-        if filled.get("planner") == "refined" and "iterations" not in filled:
+        filled.setdefault("planner", "monte-carlo" if _of_algorithm_1(filled) else "refined")
+        if filled["planner"] == "refined":
             from sparsor.design.refined import DEFAULT_ITERATIONS
 
-            filled["iterations"] = DEFAULT_ITERATIONS
+            filled.setdefault("iterations", DEFAULT_ITERATIONS)
+            filled.setdefault("budget", DEFAULT_BUDGET)
+            return filled
+        filled.setdefault("iterations", ALGORITHM_1_ITERATIONS)
+        filled.setdefault("rows", PAPER_ROWS)
+        filled.setdefault("lambda_valid", 1.0)
         both = "probability" in filled and "theta" in filled
         no_default = filled.get("paper") or "lambda_path" in filled or both
         if "budget" not in filled and no_default:
             filled.setdefault("probability", PAPER_PROBABILITY)
-            filled.setdefault("theta", min(PAPER_THETA, filled.get("rows", PAPER_THETA)))
+            filled.setdefault("theta", min(PAPER_THETA, filled["rows"]))
         elif "budget" not in filled:
             filled["budget"] = DEFAULT_BUDGET
         return filled
@@ -179,7 +194,7 @@ class MissionSpecification(_Section):
     name: str
     area: AreaSection
     prior: PriorSection = PriorSection()
-    search: SearchSection = SearchSection()
+    search: SearchSection = Field(default_factory=lambda: SearchSection.model_validate({}))
     flight: FlightSection = FlightSection()
     sensor: SensorSection | None = None
     output: OutputSection = OutputSection()
@@ -240,8 +255,10 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
         for name, filled in (("probability", PAPER_PROBABILITY), ("theta", PAPER_THETA)):
             if search.get(name) == filled:
                 del search[name]
-    if "planner" in asked and "iterations" not in asked:
-        search.pop("iterations", None)  # of the other planner
+    wanted = asked.get("planner", "monte-carlo" if _of_algorithm_1(asked) else search["planner"])
+    if wanted != search["planner"]:  # what was said to the other one is not meant for it
+        for name in ("planner", "iterations", *_ALGORITHM_1):
+            search.pop(name, None)
     for section, values in _without_none(data).items():
         if section == "area" and values:
             merged[section] = values
@@ -302,6 +319,11 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
             "sensor": sensor,
         }
     )
+
+
+def _of_algorithm_1(settings: Mapping[str, object]) -> list[str]:
+    """Return the names of the settings given that only Algorithm 1 knows."""
+    return [name for name in sorted(_ALGORITHM_1) if settings.get(name) is not None and settings[name] is not False]
 
 
 def _without_none(data: dict[str, Any]) -> dict[str, Any]:

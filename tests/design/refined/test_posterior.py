@@ -11,9 +11,9 @@ from sparsor.design import Budget, unit_legs
 from sparsor.design.decoders.covariance import kernel_covariance
 from sparsor.design.refined import Sensor, Task
 from sparsor.design.refined.annealing import route_error
-from sparsor.design.refined.dense import inner_products, inverse, solve
+from sparsor.design.refined.dense import gram, inner_products, inverse_root, solve
 from sparsor.design.refined.flyover import flyover, passes
-from sparsor.design.refined.posterior import belief, changed, expected_error, posterior
+from sparsor.design.refined.posterior import belief, changed, posterior_root, root_error
 from sparsor.design.refined.readings import readings, readings_after, weights
 from sparsor.prior.statistics import Kernel
 
@@ -89,14 +89,15 @@ def test_a_change_of_route_is_what_starting_afresh_gives(one, other, sensor):
     np.testing.assert_allclose(made.row, fresh.row, atol=0.03)
 
     def after(one):
-        return posterior(known, known.factor[one.cell] if sensor.tau_s == 0 else one.row, one.precision)
+        return posterior_root(known, known.factor[one.cell] if sensor.tau_s == 0 else one.row, one.precision)
 
-    before, expected = after(start), after(fresh)
+    before, expected = gram(after(start)), gram(after(fresh))
     if not difference.size:
         np.testing.assert_allclose(before, expected, atol=1e-9)
         return
     rise, left, inner = changed(known, before, rows, difference)
-    assert expected_error(known, before) + rise == pytest.approx(expected_error(known, expected), rel=0.02)
+    assert root_error(known, after(start)) == pytest.approx(before.diagonal() @ known.size)
+    assert before.diagonal() @ known.size + rise == pytest.approx(expected.diagonal() @ known.size, rel=0.02)
     if sensor.tau_s == 0:  # what a slow sensor still holds long after a change is neglected
         np.testing.assert_allclose(before - left.T @ np.linalg.solve(inner, left), expected, atol=1e-8)
 
@@ -125,7 +126,7 @@ def test_cells_outside_the_area_count_for_nothing():
 
 def test_components_below_the_noise_are_left_out():
     values = np.linalg.eigvalsh(covariance())
-    assert belief(covariance(), ALL, noise=0.3).spread.size - 1 == (values > 0.3).sum() < CELLS
+    assert belief(covariance(), ALL, least=0.3).spread.size - 1 == (values > 0.3).sum() < CELLS
 
 
 def test_dwelling_helps_a_slow_sensor():
@@ -139,4 +140,6 @@ def test_the_compiled_algebra_is_numpy_s():
     a, b, square = rng.normal(size=(5, 7)), rng.normal(size=(6, 4)), rng.normal(size=(6, 6))
     np.testing.assert_allclose(inner_products(a, a[:3]), a @ a[:3].T)
     np.testing.assert_allclose(solve(square, b), np.linalg.solve(square, b))
-    np.testing.assert_allclose(inverse(square @ square.T), np.linalg.inv(square @ square.T), rtol=1e-6)
+    root = inverse_root(square @ square.T)
+    np.testing.assert_allclose(root, np.tril(root))
+    np.testing.assert_allclose(gram(root), np.linalg.inv(square @ square.T), rtol=1e-6)

@@ -37,7 +37,7 @@ def task(legs=LEGS, budget=None, sensor=SENSOR, **options):
 
 def expected(one, stops):
     """The error of the last stage's model, as a route states it."""
-    known = belief(one.covariance, one.legs.allowed, rank=128, noise=one.sensor.noise)
+    known = belief(one.covariance, one.legs.allowed, rank=128, least=one.least_telling)
     return route_error(known, flyover(one.legs), one.sensor, stops)
 
 
@@ -46,7 +46,7 @@ def test_the_route_is_within_the_budget_and_better_than_every_start():
     route = refine(one, seed=0, iterations=4000)
     assert route.used == pytest.approx(LEGS.path_length(route.stops))
     assert route.used <= LIMIT
-    begun = starts(belief(one.covariance, ALL, rank=128, noise=1e-3), costs(one.budget, LEGS), SHAPE, 1e-3)
+    begun = starts(belief(one.covariance, ALL, rank=128), costs(one.budget, LEGS), SHAPE, 1e-3)
     assert len(begun) > 4
     assert route.expected_error == pytest.approx(expected(one, route.stops))
     assert route.expected_error < 0.98 * min(expected(one, stops) for stops in begun)
@@ -139,7 +139,7 @@ def test_with_a_time_to_spend_it_goes_on():
 
 
 def test_rankings_name_each_cell_once():
-    prior = belief(task().covariance, ALL, rank=20, noise=1e-3)
+    prior = belief(task().covariance, ALL, rank=20)
     for ranking in (pivots(prior, 1e-3), most_telling(prior, 1e-3)):
         assert np.unique(ranking).size == ranking.size == 21
         assert LEGS.path_length(tour_within(ranking, costs(Budget(LIMIT, "distance"), LEGS))) <= LIMIT

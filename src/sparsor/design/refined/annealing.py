@@ -8,12 +8,13 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.design.refined.costs import Costs, used
 from sparsor.design.refined.crossings import crosses
-from sparsor.design.refined.dense import solve
+from sparsor.design.refined.dense import gram, solve
 from sparsor.design.refined.flyover import Flyover, passes
 from sparsor.design.refined.moves import propose
-from sparsor.design.refined.posterior import Belief, changed, expected_error, posterior
+from sparsor.design.refined.posterior import Belief, changed, posterior_root, root_error
 from sparsor.design.refined.readings import Readings, Sensor, readings, readings_after
 
+_MOST_CHANGED = 0.65  # readings per component: an update by more costs more than starting afresh
 _MOST_UPDATES = 8  # taking readings away again amplifies rounding: then the posterior is made afresh
 
 
@@ -21,7 +22,7 @@ _MOST_UPDATES = 8  # taking readings away again amplifies rounding: then the pos
 def route_error(prior: Belief, over: Flyover, sensor: Sensor, stops: NDArray[np.int64]) -> float:
     """Return the expected error of the route over `stops`: the mean posterior variance over the cells that count."""
     cell, seconds = passes(over, stops)
-    return expected_error(prior, _afresh(prior, sensor, readings(prior, sensor, cell, seconds)))
+    return root_error(prior, _afresh(prior, sensor, readings(prior, sensor, cell, seconds)))
 
 
 @njit(cache=True, nogil=True)
@@ -59,8 +60,8 @@ def anneal(
     stops = start.copy()
     cell, seconds = passes(over, stops)
     known = readings(prior, sensor, cell, seconds)
-    covariance = _afresh(prior, sensor, known)
-    error = expected_error(prior, covariance)
+    root = _afresh(prior, sensor, known)
+    covariance, error = gram(root), root_error(prior, root)
     best, best_error, updates = stops, error, 0
     for temperature in temperatures:
         trial = propose(stops, prior.allowed, over.columns, over.hold_s > 0, rng)
@@ -75,12 +76,12 @@ def anneal(
             stops, known = trial, made
             continue
         most_rise = error * np.expm1(-temperature * np.log(1.0 - rng.random()))
-        if difference.size > prior.spread.size:  # an update would cost more than starting afresh
-            fresh = _afresh(prior, sensor, made)
-            if expected_error(prior, fresh) - error > most_rise:
+        if difference.size > _MOST_CHANGED * prior.spread.size:
+            root = _afresh(prior, sensor, made)
+            fresh = root_error(prior, root)
+            if fresh - error > most_rise:
                 continue
-            stops, known, covariance, updates = trial, made, fresh, 0
-            error = expected_error(prior, covariance)
+            stops, known, covariance, error, updates = trial, made, gram(root), fresh, 0
         else:
             rise, left, inner = changed(prior, covariance, rows, difference)
             if rise > most_rise:
@@ -89,8 +90,8 @@ def anneal(
             updates += 1
             if error < best_error or updates == _MOST_UPDATES:
                 known = readings(prior, sensor, cell, seconds)
-                covariance, updates = _afresh(prior, sensor, known), 0
-                error = expected_error(prior, covariance)
+                root = _afresh(prior, sensor, known)
+                covariance, error, updates = gram(root), root_error(prior, root), 0
             else:
                 covariance -= np.dot(np.ascontiguousarray(left.T), solve(inner, left))
         if error < best_error:
@@ -100,13 +101,13 @@ def anneal(
 
 @njit(cache=True, nogil=True)
 def _afresh(prior: Belief, sensor: Sensor, known: Readings) -> NDArray[np.float64]:
-    """Return the posterior covariance of the coefficients after all readings."""
+    """Return the root of the posterior covariance of the coefficients after all readings."""
     rows = known.row
     if sensor.tau_s == 0.0:
         rows = np.empty((known.cell.size, prior.spread.size))
         for k in range(known.cell.size):
             rows[k] = prior.factor[known.cell[k]]
-    return posterior(prior, rows, known.precision)
+    return posterior_root(prior, rows, known.precision)
 
 
 @njit(cache=True, nogil=True)

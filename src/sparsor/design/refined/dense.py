@@ -55,8 +55,8 @@ def solve(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def inverse(a: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse of a symmetric positive definite matrix, by Cholesky's decomposition."""
+def inverse_root(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lower triangular R with ``R.T @ R`` the inverse of a symmetric positive definite matrix."""
     n = a.shape[0]
     root = np.zeros((n, n))
     for i in range(n):
@@ -65,7 +65,7 @@ def inverse(a: NDArray[np.float64]) -> NDArray[np.float64]:
             for k in range(j):
                 total -= root[i, k] * root[j, k]
             root[i, j] = np.sqrt(total) if i == j else total / root[j, j]
-    back = np.zeros((n, n))  # the inverse of the root, row by row
+    back = np.zeros((n, n))  # the inverse of Cholesky's root, row by row
     for i in range(n):
         for k in range(i):
             factor = root[i, k]
@@ -74,9 +74,16 @@ def inverse(a: NDArray[np.float64]) -> NDArray[np.float64]:
         for j in range(i):
             back[i, j] /= root[i, i]
         back[i, i] = 1 / root[i, i]
+    return back
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def gram(root: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``root.T @ root`` of a lower triangular matrix."""
+    n = root.shape[0]
     out = np.zeros((n, n))
     for k in range(n):
         for i in range(k + 1):
             for j in range(k + 1):
-                out[i, j] += back[k, i] * back[k, j]
+                out[i, j] += root[k, i] * root[k, j]
     return out

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
-from sparsor.design.refined.dense import inner_products, inverse, solve
+from sparsor.design.refined.dense import inner_products, inverse_root, solve
 
 _LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
 _LEAST_NOISE = 1e-6  # of the map's variance
@@ -44,7 +44,7 @@ class Belief(NamedTuple):
 
 
 def belief(
-    covariance: NDArray[np.float64], allowed: NDArray[np.bool_], *, rank: int = 96, noise: float = 0.0
+    covariance: NDArray[np.float64], allowed: NDArray[np.bool_], *, rank: int = 96, least: float = 0.0
 ) -> Belief:
     """Return the leading components of a covariance as the search needs them.
 
@@ -56,14 +56,13 @@ def belief(
         Cells that count and may be flown.
     rank : int
         Most components.
-    noise : float
-        Variance of a reading, in the unit of the covariance: components that say less than this of all cells together
-        cannot be told from it and are left out.
+    least : float
+        Components of less variance, over all cells together, are left out.
     """
     cells = np.flatnonzero(allowed)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
     leading = values.argsort()[::-1][:rank]
-    leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), noise)]
+    leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), least)]
     # The signs that LAPACK gives are its own; they do not change any result.
     inside = vectors[:, leading] * np.sqrt(values[leading])
     left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
@@ -77,8 +76,8 @@ def belief(
 
 
 @njit(cache=True, nogil=True)
-def posterior(prior: Belief, rows: NDArray[np.float64], precision: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the covariance of the coefficients after readings, (r+1, r+1).
+def posterior_root(prior: Belief, rows: NDArray[np.float64], precision: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lower triangular R with ``R.T @ R`` the covariance of the coefficients after readings, (r+1, r+1).
 
     Parameters
     ----------
@@ -95,15 +94,16 @@ def posterior(prior: Belief, rows: NDArray[np.float64], precision: NDArray[np.fl
     information = np.dot(scaled, scaled.T)
     for j in range(prior.spread.size):
         information[j, j] += 1 / prior.spread[j]
-    return inverse(information)
+    return inverse_root(information)
 
 
 @njit(cache=True, nogil=True)
-def expected_error(prior: Belief, covariance: NDArray[np.float64]) -> float:
-    """Return the mean variance of the map over the cells that count, less what no reading explains."""
+def root_error(prior: Belief, root: NDArray[np.float64]) -> float:
+    """Return the mean posterior variance over the cells that count, less what no reading explains."""
     total = 0.0
-    for j in range(prior.size.size):
-        total += prior.size[j] * covariance[j, j]
+    for k in range(root.shape[0]):
+        for i in range(k + 1):
+            total += prior.size[i] * root[k, i] ** 2
     return total
 
 

@@ -40,6 +40,7 @@ _STREAM = 5  # not one of Algorithm 1's, nor of the rehearsal's
 _PIECE = 1000  # moves between two looks at the clock
 LEAST_ITERATIONS = 10
 _ROUNDING = 1e-9
+_HARDLY = 0.3  # of the information that halves a variance
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,18 @@ class Task:
         for name, value in {**self.sensor._asdict(), "hold_s": self.hold_s, "braking_s": self.braking_s}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
+
+    @property
+    def reading_noise(self) -> float:
+        """Variance of the reading of a cell that is flown through."""
+        return self.sensor.noise + self.sensor.noise_s / self.legs.step(self.legs.seconds)
+
+    @property
+    def least_telling(self) -> float:
+        """Variance of a component of the maps, over all cells together, that the longest flight hardly tells of."""
+        table = self.legs.length if self.budget.measure == "distance" else self.legs.seconds
+        readings = self.budget.limit / self.legs.step(table)
+        return _HARDLY * self.reading_noise * float(self.legs.allowed.sum()) / readings
 
     def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
@@ -179,8 +192,8 @@ class _Search:
         self.task, self.seed, self.moves, self.workers, self.progress = task, seed, iterations, workers, progress
         self.over_cells = flyover(task.legs, hold_s=task.hold_s)
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
-        noise = task.sensor.noise
-        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, noise=noise) for one in _STAGES]
+        least = task.least_telling
+        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, least=least) for one in _STAGES]
         self.begun, self.seconds = time.monotonic(), seconds
         self.interrupted = Event()
         self.done, self.lock = 0, Lock()
@@ -193,7 +206,7 @@ class _Search:
 
     def from_starts(self, begin: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Return the best route that all stages find from the starts."""
-        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape, self.task.sensor.noise)]
+        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape, self.task.reading_noise)]
         routes = [stops for stops in routes if self.fits(stops)]
         if not routes:
             say = self.task.budget.describe
