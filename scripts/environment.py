@@ -35,7 +35,8 @@ def python(*groups: str) -> Path:
     if mark.is_file() and mark.read_text() == state and executable.is_file():
         return executable
     print(f"setting up {FOLDER} (once; a few minutes)", flush=True)
-    venv.create(FOLDER, with_pip=True, clear=not executable.is_file())
+    if Path(sys.prefix) != FOLDER.resolve():  # run by its own Python it is there, and cannot be written over
+        venv.create(FOLDER, with_pip=True, clear=not executable.is_file())
     run(executable, "-m", "pip", "install", "--quiet", "--upgrade", PIP)
     chosen = [word for group in groups for word in ("--group", group)]
     run(executable, "-m", "pip", "install", "--quiet", "--editable", str(ROOT), *chosen)

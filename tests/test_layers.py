@@ -30,7 +30,7 @@ STAGES = (
     "cli",
 )
 ONLY_IN = {"pyproj": "sparsor.geodesy.lengths", "mavsdk": "sparsor.link"}
-LATE = frozenset({"rasterio", "xarray", "matplotlib", "dask", "mavsdk", "sklearn", "pyogrio"})
+LATE = frozenset({"rasterio", "xarray", "matplotlib", "dask", "distributed", "mavsdk", "sklearn", "pyogrio"})
 NOT_FOR_HELP = ("numpy", "numba", "scipy", "sklearn", "matplotlib", "rasterio")
 
 

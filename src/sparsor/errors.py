@@ -43,6 +43,14 @@ class BudgetError(InputError):
     """A flight budget that cannot be read, or that no route meets."""
 
 
+class SchedulerError(InputError):
+    """A scheduler that does not answer, has no workers, or whose workers would give another answer."""
+
+
+class WorkersLostError(SparsorError):
+    """The scheduler went away in the middle, or workers died again and again."""
+
+
 class VehicleError(InputError):
     """A vehicle or sensor profile that is unknown or outside its range."""
 

@@ -39,6 +39,12 @@ Quiet = Annotated[bool, quiet_option("Print the result's path only.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show tracebacks and details.", rich_help_panel=TELLING)]
 
 
+SCHEDULER = (
+    "Share the work among processes: 'local' starts some on this machine, the address of a dask scheduler, e.g. "
+    "tcp://192.168.1.5:8786, takes its workers (default: threads). The result is the same."
+)
+
+
 class Talk(IntEnum):
     """How much a command says."""
 

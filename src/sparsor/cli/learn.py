@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from sparsor.cli.console import (
+    SCHEDULER,
     Json,
     Quiet,
     Talk,
@@ -56,6 +57,9 @@ def learn(
         bool, typer.Option("--uncentred", help="Learn without taking off the mean, as the paper does.")
     ] = False,
     seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="local|ADDRESS", help=SCHEDULER, show_default=False)
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -64,6 +68,7 @@ def learn(
 
     sparsor learn no2.tif -o no2.npz --window 400 400
     """
+    from sparsor.core.cluster import workers_at
     from sparsor.journeys.learning import LearnRequest, learn_from_fields
 
     talk = Talk.of(quiet=quiet, verbose=verbose)
@@ -81,8 +86,8 @@ def learn(
         centred=not uncentred,
         seed=seed,
     )
-    with progress_bar(talk) as progress:
-        learned = learn_from_fields(request, output, progress=progress)
+    with workers_at(scheduler) as hands, progress_bar(talk) as progress:
+        learned = learn_from_fields(request, output, workers=hands, progress=progress)
     model = learned.model
     if as_json:
         print_json(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sparsor.cli.console import (
+    SCHEDULER,
     Json,
     Talk,
     Verbose,
@@ -161,12 +162,13 @@ def plan(
         int | None,
         typer.Option(
             "--workers",
-            help="Threads (default: one a core); the plan is the same for any number.",
+            help="Threads, or processes of --scheduler local (default: one a core); the plan is the same for any.",
             rich_help_panel=SEARCH,
             min=1,
             show_default=False,
         ),
     ] = None,
+    scheduler: Annotated[str | None, _option(SEARCH, SCHEDULER, "--scheduler", metavar="local|ADDRESS")] = None,
     vehicle: Annotated[
         str | None, _option(FLIGHT, "quad, or a profile of your own (.toml) (default: quad).", "--vehicle")
     ] = None,
@@ -254,13 +256,14 @@ def plan(
         "output": {"export": _formats(export)},
     }
     spec, folder = _request(given, mission_file, output)
+    from sparsor.core.cluster import workers_at
     from sparsor.journeys.advice import advice
     from sparsor.journeys.folder import check_folder, write_mission
     from sparsor.journeys.planning import plan_mission
 
     check_folder(spec, folder, force=force)
-    with progress_bar(talk) as progress:
-        mission = plan_mission(spec, workers=workers, progress=progress)
+    with workers_at(scheduler, workers) as hands, progress_bar(talk) as progress:
+        mission = plan_mission(spec, workers=hands, progress=progress)
     written = write_mission(mission, folder)
     result = mission_values(mission, folder)
     if as_json:

@@ -7,19 +7,17 @@ stream, so that the answer does not depend on how many workers share the samples
 
 from __future__ import annotations
 
+import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from itertools import count
-from threading import Lock
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
-from sparsor.core.workers import one_blas_thread
+from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.budget import Budget  # noqa: TC001
 from sparsor.design.candidate import reconstruction_error
 from sparsor.design.legs import LegTable  # noqa: TC001
@@ -28,7 +26,6 @@ from sparsor.design.sensing import draw_phi, incoherence, measured_atoms
 from sparsor.errors import BudgetError, DesignError
 
 _BLOCK = 16  # samples handed to a worker at a time
-_SLICE = 256  # blocks that wait for a worker
 # Skipping has to be exact: a candidate is given up only when it is worse by more than rounding.
 _SLACK = 1.0 + 1e-9
 
@@ -124,24 +121,45 @@ class Candidate:
 
 @dataclass
 class _Best:
-    """The best candidate so far, shared by the workers."""
+    """The best candidate so far.
+
+    Parameters
+    ----------
+    candidate : Candidate, optional
+    shortest : float
+        What the shortest route beyond the budget uses of it.
+    reached : float
+        A cost that others have found already.
+    """
 
     candidate: Candidate | None = None
     shortest: float = np.inf
-    lock: Lock = field(default_factory=Lock)
+    reached: float = np.inf
 
     def ceiling(self) -> float:
-        return np.inf if self.candidate is None else self.candidate.cost
+        return self.reached if self.candidate is None else min(self.candidate.cost, self.reached)
 
     def offer(self, candidate: Candidate) -> None:
-        with self.lock:
-            held = self.candidate
-            if held is None or (candidate.cost, candidate.sample) < (held.cost, held.sample):
-                self.candidate = candidate
+        held = self.candidate
+        if held is None or (candidate.cost, candidate.sample) < (held.cost, held.sample):
+            self.candidate = candidate
+
+    def merge(self, other: _Best) -> None:
+        if other.candidate is not None:
+            self.offer(other.candidate)
+        self.too_long(other.shortest)
 
     def too_long(self, used: float) -> None:
-        with self.lock:
-            self.shortest = min(self.shortest, used)
+        self.shortest = min(self.shortest, used)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """A range of samples, and the lowest cost that was known when it was handed out."""
+
+    first: int
+    last: int
+    reached: float
 
 
 def search(
@@ -152,7 +170,7 @@ def search(
     seed: int,
     iterations: int,
     seconds: float | None = None,
-    workers: int = 1,
+    workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> Candidate:
     """Run Algorithm 1.
@@ -168,8 +186,8 @@ def search(
         n_iter, the number of samples.
     seconds : float, optional
         Search for this long instead of `iterations`; the answer then depends on the machine.
-    workers : int
-        Threads; the compiled parts run side by side.
+    workers : Workers or int
+        Who draws and evaluates the samples; a number is one of threads.
     progress : Progress
 
     Raises
@@ -181,27 +199,23 @@ def search(
     """
     if iterations < 1:
         raise DesignError(f"iterations is {iterations}; at least 1 is needed")
-    best = _Best()
+    best, tried, begun = _Best(), 0, time.monotonic()
+    hands = workers_of(workers)
 
-    def run(block: int) -> int:
-        last = min((block + 1) * _BLOCK, iterations) if seconds is None else (block + 1) * _BLOCK
-        for sample in range(block * _BLOCK, last):
-            _try_draw(problem, sparsity, weights, stream(seed, sample), sample, best)
-        return last
+    def handed_out() -> Iterator[_Samples]:
+        first, end, size = 0, iterations if seconds is None else sys.maxsize, _BLOCK * hands.grain
+        while first < end and (seconds is None or time.monotonic() - begun < seconds):
+            last = min(first + size, end)
+            yield _Samples(first, last, best.ceiling())
+            first = last
 
-    tried = 0
-    with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
-        try:
+    with one_blas_thread():
+        for tried, found in hands.map(_try_samples, hands.share((problem, sparsity, weights, seed)), handed_out()):
+            best.merge(found)
             if seconds is None:
-                blocks = range(-(-iterations // _BLOCK))
-                for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
-                    for tried in pool.map(run, blocks[first : first + _SLICE]):
-                        progress("searching", tried, iterations)
+                progress("searching", tried, iterations)
             else:
-                tried = _search_for(seconds, pool, run, workers, progress)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+                progress("searching", int(min(time.monotonic() - begun, seconds) * 1000), int(seconds * 1000))
     return _winner(problem, best, tried)
 
 
@@ -219,18 +233,13 @@ def fixed_sparsity(probability: float, theta: int) -> Sparsity:
     return lambda _rng: (probability, theta)
 
 
-def _search_for(
-    seconds: float, pool: ThreadPoolExecutor, run: Callable[[int], int], workers: int, progress: Progress
-) -> int:
-    """Work through blocks until the time is up; return how many samples were tried."""
-    start = time.monotonic()
-    for block in count(0, workers):
-        tried = max(pool.map(run, range(block, block + workers)))
-        passed = time.monotonic() - start
-        progress("searching", int(min(passed, seconds) * 1000), int(seconds * 1000))
-        if passed >= seconds:
-            break
-    return tried
+def _try_samples(given: tuple[Problem, Sparsity, Weights, int], samples: _Samples) -> tuple[int, _Best]:
+    """Try a range of samples; return where it ends, and the best of those below the cost reached before."""
+    problem, sparsity, weights, seed = given
+    best = _Best(reached=samples.reached)
+    for sample in range(samples.first, samples.last):
+        _try_draw(problem, sparsity, weights, stream(seed, sample), sample, best)
+    return samples.last, best
 
 
 def _try_draw(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
-from sparsor.core.workers import one_blas_thread
+from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity
 from sparsor.errors import DesignError
 
@@ -26,7 +27,14 @@ _PILOT, _TUNING = 1, 2
 
 
 def choose_lasso_weight(
-    psi: NDArray[np.float64], maps: NDArray[np.float64], legs: LegTable, *, rows: int = 35, seed: int = 0
+    psi: NDArray[np.float64],
+    maps: NDArray[np.float64],
+    legs: LegTable,
+    *,
+    rows: int = 35,
+    seed: int = 0,
+    workers: Workers | int = 1,
+    progress: Progress = silent,
 ) -> float:
     """Return the lambda with the lowest mean validation error over random Phi of the paper's kind.
 
@@ -41,20 +49,28 @@ def choose_lasso_weight(
         Only its size and allowed cells matter.
     rows : int
     seed : int
+    workers : Workers or int
+        Who tries the values; a number is one of threads.
+    progress : Progress
     """
-    kinds = (fixed_sparsity(0.03, 3), fixed_sparsity(0.014, 3))
-    scores = []
-    for weight in LASSO_WEIGHTS:
-        problem = Problem(psi, maps, weight, legs, rows, improve=False)
-        with one_blas_thread():
-            drawn = [
-                evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
-                for kind in kinds
-                for draw in range(_TUNING_DRAWS)
-            ]
-        # Each kind of Phi counts the same, whatever the size of its error: hence the logarithm.
-        scores.append(np.mean([np.log(max(one.error, 1e-300)) for one in drawn if one is not None] or [0.0]))
+    hands, scores = workers_of(workers), []
+    shared = hands.share((Problem(psi, maps, 1.0, legs, rows, improve=False), seed))
+    with one_blas_thread():
+        for score in hands.map(_typical_error, shared, LASSO_WEIGHTS):
+            scores.append(score)
+            progress("choosing lambda", len(scores), len(LASSO_WEIGHTS))
     return LASSO_WEIGHTS[int(np.argmin(scores))]
+
+
+def _typical_error(given: tuple[Problem, int], weight: float) -> float:
+    """Return the mean logarithm of the error with a lambda: each kind of Phi counts the same, whatever its error."""
+    problem, seed = replace(given[0], lasso_weight=weight), given[1]
+    drawn = [
+        evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
+        for kind in (fixed_sparsity(0.03, 3), fixed_sparsity(0.014, 3))
+        for draw in range(_TUNING_DRAWS)
+    ]
+    return float(np.mean([np.log(max(one.error, 1e-300)) for one in drawn if one is not None] or [0.0]))
 
 
 def pilot(problem: Problem, sparsity: Sparsity, *, seed: int) -> list[Candidate]:

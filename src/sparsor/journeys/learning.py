@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast, get_args
 
 from sparsor.core.files import write_file
 from sparsor.core.progress import Progress, silent
+from sparsor.core.workers import Workers, workers_of
 from sparsor.errors import FieldError, ModelError
 from sparsor.geodesy import BoundingBox
 from sparsor.journeys.modelling import learn_model, representation_error, with_sources
@@ -80,8 +81,19 @@ class LearnedModel:
     warnings: tuple[str, ...]
 
 
-def learn_from_fields(request: LearnRequest, output: Path, *, progress: Progress = silent) -> LearnedModel:
+def learn_from_fields(
+    request: LearnRequest, output: Path, *, workers: Workers | int | None = None, progress: Progress = silent
+) -> LearnedModel:
     """Learn a model from fields and write it.
+
+    Parameters
+    ----------
+    request : LearnRequest
+    output : Path
+    workers : Workers or int, optional
+        Who learns, see `sparsor.core.cluster.workers_at`; a number is one of threads, one a core by default. The model
+        is the same for any.
+    progress : Progress
 
     Raises
     ------
@@ -109,6 +121,7 @@ def learn_from_fields(request: LearnRequest, output: Path, *, progress: Progress
         centred=request.centred,
         dictionary=cast("DictionaryName", request.dictionary),
         seed=request.seed,
+        workers=workers_of(workers),
         progress=progress,
     )
     content = arrays_to_npz(model_arrays(with_sources(model, dict(zip(request.fields, fields, strict=True)))))

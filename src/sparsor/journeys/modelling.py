@@ -15,7 +15,7 @@ import numpy as np
 from sparsor.core.files import sha256_of, write_file
 from sparsor.core.metrics import centred_relative_error
 from sparsor.core.progress import Progress, silent
-from sparsor.core.workers import one_blas_thread
+from sparsor.core.workers import Workers, one_blas_thread
 from sparsor.design import unit_legs
 from sparsor.design.lars import lasso
 from sparsor.design.tuning import choose_lasso_weight
@@ -75,7 +75,12 @@ class PriorChoice:
 
 
 def choose_prior(
-    request: PriorSection, box: BoundingBox, *, paper: bool = False, progress: Progress = silent
+    request: PriorSection,
+    box: BoundingBox,
+    *,
+    paper: bool = False,
+    workers: Workers | int = 1,
+    progress: Progress = silent,
 ) -> PriorChoice:
     """Return the model that a mission over `box` is planned with.
 
@@ -85,6 +90,8 @@ def choose_prior(
     box : BoundingBox
     paper : bool
         The paper's dictionary: as many atoms as cells, learned without centring.
+    workers : Workers or int
+        Who learns; a number is one of threads.
     progress : Progress
 
     Raises
@@ -96,8 +103,8 @@ def choose_prior(
         return _from_file(request, box, paper=paper)
     atoms = request.atoms or (SHAPE[0] * SHAPE[1] if paper else DEFAULT_ATOMS)
     if request.field is None:
-        return _built_in(box, atoms, paper=paper, progress=progress)
-    return _from_field(request, box, atoms, paper=paper, progress=progress)
+        return _built_in(box, atoms, paper=paper, workers=workers, progress=progress)
+    return _from_field(request, box, atoms, paper=paper, workers=workers, progress=progress)
 
 
 def learn_model(
@@ -107,9 +114,12 @@ def learn_model(
     centred: bool = True,
     dictionary: DictionaryName = "learned",
     seed: int = 0,
+    workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> Model:
     """Learn a model from maps and choose its lambda on the validation maps.
+
+    What the workers share is the choice of lambda; the dictionary is learned in one go, batch after batch.
 
     Raises
     ------
@@ -118,9 +128,14 @@ def learn_model(
     """
     with one_blas_thread():
         model = untuned_model(maps, atoms=atoms, centred=centred, dictionary=dictionary, seed=seed, progress=progress)
-    progress("choosing lambda", 0, 1)
-    weight = choose_lasso_weight(model.dictionary, model.validation - model.mean, unit_legs(model.shape), seed=seed)
-    progress("choosing lambda", 1, 1)
+    weight = choose_lasso_weight(
+        model.dictionary,
+        model.validation - model.mean,
+        unit_legs(model.shape),
+        seed=seed,
+        workers=workers,
+        progress=progress,
+    )
     return replace(model, lasso_weight=weight)
 
 
@@ -171,13 +186,16 @@ def _from_file(request: PriorSection, box: BoundingBox, *, paper: bool) -> Prior
     return PriorChoice(model, None, False, widening, said)
 
 
-def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) -> PriorChoice:
+def _built_in(box: BoundingBox, atoms: int, *, paper: bool, workers: Workers | int, progress: Progress) -> PriorChoice:
     side = nearest_side_m(box.east_m, box.north_m)
     if atoms == DEFAULT_ATOMS and not paper:
         model = builtin_model(side)
     else:
         key = {"built-in": [side, SEED, TRAINING_MAPS, VALIDATION_MAPS], "atoms": atoms, "centred": not paper}
-        model = _cached(key, lambda: learn_model(builtin_maps(side), atoms=atoms, centred=not paper, progress=progress))
+        model = _cached(
+            key,
+            lambda: learn_model(builtin_maps(side), atoms=atoms, centred=not paper, workers=workers, progress=progress),
+        )
     warnings = ["The prior is the built-in synthetic Gulf NO2 field, not a measurement: give --field or --model."]
     if not covers(box.as_tuple()):
         warnings.append(
@@ -188,7 +206,9 @@ def _built_in(box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) 
     return PriorChoice(model, None, True, widening, (*warnings, *said))
 
 
-def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: bool, progress: Progress) -> PriorChoice:
+def _from_field(
+    request: PriorSection, box: BoundingBox, atoms: int, *, paper: bool, workers: Workers | int, progress: Progress
+) -> PriorChoice:
     assert request.field is not None
     field = read_field(
         request.field,
@@ -212,7 +232,7 @@ def _from_field(request: PriorSection, box: BoundingBox, atoms: int, *, paper: b
         windows = ground_windows(field, *window_m, SHAPE)
         progress("cutting windows", 1, 1)
         maps = maps_of_fields([field], [windows], SHAPE, progress)
-        return learn_model(maps, atoms=atoms, centred=not paper, progress=progress)
+        return learn_model(maps, atoms=atoms, centred=not paper, workers=workers, progress=progress)
 
     model = _cached(key, learn)
     model = with_sources(model, {request.field: field})

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sparsor.core.progress import Progress, silent
+from sparsor.core.workers import Workers, workers_of
 from sparsor.design import (
     Budget,
     LegTable,
@@ -125,15 +125,16 @@ class PlannedMission:
 
 
 def plan_mission(
-    spec: MissionSpecification, *, workers: int | None = None, progress: Progress = silent
+    spec: MissionSpecification, *, workers: Workers | int | None = None, progress: Progress = silent
 ) -> PlannedMission:
     """Plan a mission; nothing is written.
 
     Parameters
     ----------
     spec : MissionSpecification
-    workers : int, optional
-        Threads of the search, one a core by default; the answer is the same for any number.
+    workers : Workers or int, optional
+        Who searches and learns, see `sparsor.core.cluster.workers_at`; a number is one of threads, one a core by
+        default. The answer is the same for any.
     progress : Progress
 
     Raises
@@ -144,11 +145,11 @@ def plan_mission(
     vehicle, autopilot = load_vehicle(spec.flight.vehicle), autopilot_named(spec.flight.autopilot)
     sensor = _sensor(spec)
     box, area = _where(spec)
-    prior = choose_prior(spec.prior, box, paper=spec.search.paper, progress=progress)
+    hands = workers_of(workers)
+    prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=hands, progress=progress)
     place = _place(Grid(box, prior.model.shape), area)
     legs = _legs(place, _speed(spec, vehicle))
     problem = _problem(spec, prior, legs, _budget(spec, vehicle, autopilot, place))
-    count = workers or os.cpu_count() or 1
     if spec.search.planner == "refined":
         weights = Weights()
         speed = _speed(spec, vehicle)
@@ -156,7 +157,7 @@ def plan_mission(
         braking_s = stop_seconds(vehicle, hold_s, speed) - hold_s
         assert sensor is not None
         task = refined_task(prior.model, problem, sensor, hold_s=hold_s, braking_s=braking_s)
-        candidate, error = search_refined(task, spec, prior.model, workers=count, progress=progress)
+        candidate, error = search_refined(task, spec, prior.model, workers=hands, progress=progress)
         expected = (error, error)
     else:
         sparsity = _sparsity(spec, problem)
@@ -168,7 +169,7 @@ def plan_mission(
             seed=spec.search.seed,
             iterations=spec.search.iterations,
             seconds=spec.search.time_s,
-            workers=count,
+            workers=hands,
             progress=progress,
         )
         expected = expected_errors(problem, candidate, prior.model.mean)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.core.progress import Progress
+    from sparsor.core.workers import Workers
     from sparsor.design import LegTable, Problem
     from sparsor.mission.specification import MissionSpecification
     from sparsor.prior.model import Model
@@ -60,7 +61,7 @@ def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_
 
 
 def search_refined(
-    task: Task, spec: MissionSpecification, model: Model, *, workers: int, progress: Progress
+    task: Task, spec: MissionSpecification, model: Model, *, workers: Workers, progress: Progress
 ) -> tuple[Candidate, float]:
     """Return the route with the lowest expected error, and that error by the best linear decoder.
 
@@ -71,7 +72,7 @@ def search_refined(
     task : Task
     spec : MissionSpecification
     model : Model
-    workers : int
+    workers : Workers
     progress : Progress
     """
     legs = task.legs

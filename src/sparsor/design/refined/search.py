@@ -17,7 +17,7 @@ import numpy as np
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
-from sparsor.core.workers import one_blas_thread
+from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.refined.annealing import anneal, route_error
 from sparsor.design.refined.costs import costs, used
 from sparsor.design.refined.crossings import crosses
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
     from sparsor.design.budget import Budget
     from sparsor.design.legs import LegTable
+    from sparsor.design.refined.costs import Costs
+    from sparsor.design.refined.flyover import Flyover
+    from sparsor.design.refined.posterior import Belief
 
 DEFAULT_ITERATIONS = 480_000
 _STREAM = 5  # not one of Algorithm 1's, nor of the rehearsal's
@@ -140,7 +143,7 @@ def refine(
     iterations: int = DEFAULT_ITERATIONS,
     seconds: float | None = None,
     begin: Sequence[NDArray[np.int64]] = (),
-    workers: int = 1,
+    workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> Route:
     """Search for the route with the lowest expected error.
@@ -156,8 +159,8 @@ def refine(
         machine.
     begin : sequence of arrays of int64
         Further routes to start from, e.g. Algorithm 1's; those that break the budget or cross themselves are left out.
-    workers : int
-        Threads.
+    workers : Workers or int
+        Who anneals; a number is one of threads.
     progress : Progress
 
     Returns
@@ -186,14 +189,22 @@ class _Search:
     """The stages of one search, and the clock and the keyboard that may end it early."""
 
     def __init__(
-        self, task: Task, seed: int, iterations: int, seconds: float | None, workers: int, progress: Progress
+        self,
+        task: Task,
+        seed: int,
+        iterations: int,
+        seconds: float | None,
+        workers: Workers | int,
+        progress: Progress,
     ) -> None:
         allowed = task.legs.allowed
-        self.task, self.seed, self.moves, self.workers, self.progress = task, seed, iterations, workers, progress
+        self.task, self.seed, self.moves, self.progress = task, seed, iterations, progress
         self.over_cells = flyover(task.legs, hold_s=task.hold_s)
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
         self.beliefs = [belief(task.covariance, allowed, rank=one.rank, least=least) for one in _STAGES]
+        self.hands = workers_of(workers)
+        self.shared = [self.hands.share((one, self.over_cells, task.sensor, self.costs)) for one in self.beliefs]
         self.begun, self.seconds = time.monotonic(), seconds
         self.interrupted = Event()
         self.done, self.lock = 0, Lock()
@@ -235,7 +246,7 @@ class _Search:
 
     def anneal_all(self, turn: int, level: int, routes: list[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
         """Anneal routes side by side and return the best that each led to."""
-        with ThreadPoolExecutor(self.workers) as pool:
+        with ThreadPoolExecutor(self.hands.count) as pool:
             chains = [pool.submit(self.chain, turn, level, number, stops) for number, stops in enumerate(routes)]
             try:
                 return [one.result() for one in chains]
@@ -248,17 +259,15 @@ class _Search:
         stage, rng = _STAGES[level], stream(self.seed, _STREAM, turn, level, number)
         moves = self.moves // (len(_STAGES) * stage.chains)
         temperatures = np.geomspace(stage.hot, stage.cold, moves)
-        best, lowest = stops, np.inf
-        for first in range(0, moves, _PIECE):
+        best, lowest, size = stops, np.inf, _PIECE * self.hands.grain
+        for first in range(0, moves, size):
             if self.over:
                 break
-            piece = temperatures[first : first + _PIECE]
-            stops, reached, error = anneal(
-                self.beliefs[level], self.over_cells, self.task.sensor, self.costs, stops, piece, rng
-            )
+            part = temperatures[first : first + size]
+            stops, reached, error, rng = self.hands.call(_anneal_pieces, self.shared[level], (stops, part, rng))
             if error < lowest:
                 best, lowest = reached, error
-            self.tell(piece.size)
+            self.tell(part.size)
         return best
 
     def tell(self, moves: int) -> None:
@@ -284,3 +293,17 @@ class _Search:
         return Route(
             stops, self.error(stops, level), float(used(self.costs, stops)), interrupted=self.interrupted.is_set()
         )
+
+
+def _anneal_pieces(
+    given: tuple[Belief, Flyover, Sensor, Costs],
+    part: tuple[NDArray[np.int64], NDArray[np.float64], np.random.Generator],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], float, np.random.Generator]:
+    """Anneal a route piece by piece; return the last one, the best one, its error, and the stream where it stands."""
+    stops, temperatures, rng = part
+    best, lowest = stops, np.inf
+    for first in range(0, temperatures.size, _PIECE):
+        stops, reached, error = anneal(*given, stops, temperatures[first : first + _PIECE], rng)
+        if error < lowest:
+            best, lowest = reached, error
+    return stops, best, lowest, rng
