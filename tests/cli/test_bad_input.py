@@ -218,7 +218,7 @@ def test_learning_onto_a_full_disk(console, smooth_field, monkeypatch):
     assert list(Path().iterdir()) == []
 
 
-@pytest.mark.parametrize("where", ["sparsor.journeys.planning.search", "sparsor.journeys.preview.preview_png"])
+@pytest.mark.parametrize("where", ["sparsor.journeys.planning.search_refined", "sparsor.journeys.preview.preview_png"])
 def test_an_interrupt_leaves_nothing(console, tree, monkeypatch, where):
     def interrupted(*_, **__):
         raise KeyboardInterrupt

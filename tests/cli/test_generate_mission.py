@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
+import shutil
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +70,7 @@ def test_json_is_one_object_with_the_keys_of_the_design(console):
     assert result["plans"] == ["missions/doha/doha.plan"]
     assert result["sidecar"] == "missions/doha/doha.npz"
     assert all(Path(path).is_file() for path in [*result["plans"], result["sidecar"]])
-    assert (result["planner"], result["seed"], result["sorties"]) == ("monte-carlo", 0, 1)
+    assert (result["planner"], result["seed"], result["sorties"]) == ("refined", 0, 1)
 
 
 @pytest.mark.usefixtures("no_picture")
@@ -98,7 +101,7 @@ def test_warnings_go_to_stderr(console):
 
 @pytest.mark.usefixtures("no_picture")
 def test_a_flight_beyond_the_endurance_is_marked_and_told_what_would_fly(console):
-    ran = console.mission("--hold", "600", "--json")
+    ran = console.mission("--hold", "600", "--planner", "monte-carlo", "--json")
     assert ran.code == 0
     assert ran.result["flyable"] is False
     sentence = ran.result["warnings"][0]
@@ -118,7 +121,7 @@ def test_quiet_prints_the_path_only(console):
 
 @pytest.mark.usefixtures("no_picture")
 def test_verbose_tells_what_won(console):
-    out = console.mission("-v").out
+    out = console.mission("-v", "--planner", "monte-carlo").out
     assert "theta = " in out
     assert "cost" in out
 
@@ -143,7 +146,7 @@ def test_the_same_bytes_for_any_number_of_workers_and_from_mission_toml(console,
 @pytest.mark.usefixtures("no_picture")
 def test_another_seed_is_another_plan(console):
     for seed in (0, 1):
-        console.mission("--name", "m", "-o", f"seed{seed}", "--seed", seed)
+        console.mission("--name", "m", "-o", f"seed{seed}", "--seed", seed, iterations=400)
     assert Path("seed0/m.plan").read_bytes() != Path("seed1/m.plan").read_bytes()
 
 
@@ -155,13 +158,13 @@ def test_a_folder_is_rewritten_only_for_the_same_request(console, tree):
     assert console.mission("--name", "m", "--export", "kml,geojson").code == 0
     assert tree() == before
 
-    refused = console.mission("--name", "m", "--export", "kml", "--seed", 9)
+    refused = console.mission("--name", "m", "--export", "kml", "--seed", 9, "--budget", "9%")
     assert refused.code == 2
     assert "'missions/m' holds something else already" in refused.err
     assert "--force" in refused.err
     assert tree() == before
 
-    forced = console.mission("--name", "m", "--export", "kml", "--seed", 9, "--force")
+    forced = console.mission("--name", "m", "--export", "kml", "--seed", 9, "--budget", "9%", "--force")
     assert forced.code == 0
     after = tree()
     assert set(before) - set(after) == {"missions/m/m.geojson"}
@@ -208,14 +211,48 @@ def test_a_budget_is_kept(console):
 @pytest.mark.usefixtures("no_picture")
 @pytest.mark.parametrize("budget", ["9m", "1min"])
 def test_a_budget_that_nobody_meets_names_the_shortest(console, tree, budget):
-    ran = console.mission("--budget", budget)
-    assert ran.code == 2
-    said = re.search(r"no route within .* among 30 samples: the shortest found is ([0-9.]+ (m|km|min))\.", ran.err)
-    assert said, ran.err
+    for planner, words in (
+        ("refined", "no route within .*: the shortest of two cells takes"),
+        ("monte-carlo", "no route within .* among 30 samples: the shortest found is"),
+    ):
+        ran = console.mission("--planner", planner, "--budget", budget)
+        assert ran.code == 2
+        said = re.search(words + r" ([0-9.]+ (m|km|min))\.", ran.err)
+        assert said, ran.err
+        assert tree() == {}
+        shortest = parse_budget(said[1])
+        enough = f"{shortest.value * 1.1:.3f}{'s' if shortest.measure == 'time' else 'm'}"
+        # It is true: a little more than that is met.
+        assert console.mission("--planner", planner, "--budget", enough, "-o", f"there/{planner}").code == 0
+        shutil.rmtree("there")
+
+
+def test_other_budgets_are_compared_and_the_plan_stays_the_same(console):
+    plain = console.mission("--name", "plain", "--json", iterations=500)
+    ran = console.mission("--name", "m", "--pareto", "--json", iterations=500)
+    assert ran.code == 0, ran.err
+    assert Path("missions/m/m.plan").read_bytes() == Path("missions/plain/plain.plan").read_bytes()
+    curve = ran.result["pareto"]
+    assert [one["budget"] for one in curve] == ["4%", "6%", "8%", "10%", "13%", "17%", "22%", "30%"]
+    (planned,) = (one for one in curve if one["budget"] == "10%")
+    assert planned["expected_relative_error"] == plain.result["expected_relative_error"]
+    for shorter, longer in pairwise(curve):
+        assert shorter["path_length_m"] < longer["path_length_m"]
+    assert curve[-1]["expected_relative_error"] < 0.5 * curve[0]["expected_relative_error"]
+    with Path("missions/m/pareto.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["flight_time_s"]) for row in rows] == [one["flight_time_s"] for one in curve]
+    with Image.open("missions/m/pareto.png") as picture:
+        assert picture.size[0] == 1400
+    again = console("generate-mission", "missions/m/mission.toml")  # without: what it made goes
+    assert again.code == 0, again.err
+    assert not Path("missions/m/pareto.csv").exists()
+
+
+def test_without_a_budget_there_is_nothing_to_compare(console, tree):
+    ran = console.mission("--pareto", "--lambda-path", 0.01)
+    assert (ran.code, "--budget" in ran.err) == (2, True)
     assert tree() == {}
-    shortest = parse_budget(said[1])
-    enough = f"{shortest.value * 1.02:.3f}{'s' if shortest.measure == 'time' else 'm'}"
-    assert console.mission("--budget", enough).code == 0  # it is true: a little more than that is met
 
 
 HOUSE = [[51.50, 25.27], [51.53, 25.27], [51.53, 25.285], [51.515, 25.30], [51.50, 25.285], [51.50, 25.27]]
@@ -283,7 +320,8 @@ def test_a_box_across_the_antimeridian(console):
 def test_the_sensor_is_told_to_whoever_rebuilds_the_map(console):
     Path("mine.toml").write_text('name = "mine"\nunit = "ug/m3"\nt90_s = 12.0\n', encoding="utf-8")
     for options, answer_s, unit in (
-        ((), None, None),
+        ((), 30.0, "ppb"),
+        (("--planner", "monte-carlo"), None, None),
         (("--t90", 20), 20.0, "ppb"),
         (("--sensor-profile", "no2"), 30.0, "ppb"),
         (("--sensor-profile", "mine.toml"), 12.0, "ug/m3"),

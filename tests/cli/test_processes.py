@@ -59,7 +59,8 @@ def test_ctrl_c_in_the_middle_leaves_the_old_files(tmp_path):
     for name, content in old.items():
         (folder / name).write_bytes(content)
     ours, theirs = pty.openpty()
-    process = start(*BOX, "--iterations", "200000", "--name", "m", "--force", cwd=tmp_path, stderr=theirs)
+    words = ("--planner", "monte-carlo", "--iterations", "200000", "--name", "m", "--force")
+    process = start(*BOX, *words, cwd=tmp_path, stderr=theirs)
     os.close(theirs)
     assert b"searching" in read_until(ours, b"searching")  # the progress bar of a terminal
     process.send_signal(signal.SIGINT)
@@ -73,6 +74,26 @@ def test_ctrl_c_in_the_middle_leaves_the_old_files(tmp_path):
     assert b"Traceback" not in said
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == old
     assert [path.name for path in tmp_path.iterdir()] == ["missions"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals, and Ctrl-C reaches the whole console")
+def test_ctrl_c_ends_the_refined_search_with_the_best_so_far(tmp_path):
+    import pty
+
+    ours, theirs = pty.openpty()
+    process = start(*BOX, "--iterations", "50000000", "--name", "m", cwd=tmp_path, stderr=theirs)
+    os.close(theirs)
+    assert b"refining" in read_until(ours, b"refining")
+    process.send_signal(signal.SIGINT)
+    said = read_until(ours, b"warning: The search was interrupted: the route is the best")
+    assert b"the route is the best" in said
+    assert b"Traceback" not in said
+    while read_until(ours, b"warning"):
+        pass
+    assert process.wait(timeout=60) == 0
+    process.stdout.close()
+    os.close(ours)
+    assert (tmp_path / "missions" / "m" / "m.plan").is_file()
 
 
 def read_until(terminal, words):

@@ -18,7 +18,8 @@ from sparsor.mission.sidecar import read_sidecar
 from sparsor.mission.specification import AreaSection, OutputSection, changed, specification
 
 BOX = (51.50, 25.27, 51.53, 25.30)
-SPEC = specification({"name": "m", "area": {"bbox": BOX}, "search": {"iterations": 30}}, base=Path("/"))
+SEARCH = {"planner": "monte-carlo", "iterations": 30}
+SPEC = specification({"name": "m", "area": {"bbox": BOX}, "search": SEARCH}, base=Path("/"))
 
 
 def with_search(**settings):

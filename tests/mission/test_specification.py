@@ -96,6 +96,9 @@ def test_paths_are_relative_to_the_file_so_that_folders_can_move(tmp_path):
 def test_everything_left_out_is_filled_in():
     filled = spec().model_dump(exclude_none=True)
     assert filled["search"] == {
+        "planner": "refined", "paper": False, "iterations": 480_000, "seed": 0, "budget": "10%",
+    }  # fmt: skip
+    assert spec(search={"planner": "monte-carlo"}).model_dump(exclude_none=True)["search"] == {
         "planner": "monte-carlo", "paper": False, "rows": 35, "lambda_valid": 1.0, "iterations": 4000, "seed": 0,
         "budget": "10%",
     }  # fmt: skip

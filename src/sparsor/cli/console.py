@@ -161,6 +161,20 @@ def print_table(rows: Sequence[tuple[str, str]], title: str) -> None:
     Console(highlight=False, soft_wrap=False).print(table)
 
 
+def print_columns(names: Sequence[str], rows: Sequence[Sequence[str]], title: str) -> None:
+    """Print a table of several columns with their names."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE, pad_edge=False)
+    for name in names:
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    Console(highlight=False, soft_wrap=False).print(table)
+
+
 def warn(warnings: Sequence[str]) -> None:
     """Print warnings on stderr."""
     for warning in warnings:

@@ -13,6 +13,7 @@ from sparsor.cli.console import (
     Json,
     Talk,
     Verbose,
+    print_columns,
     print_json,
     print_table,
     progress_bar,
@@ -20,9 +21,10 @@ from sparsor.cli.console import (
     reporting,
     warn,
 )
-from sparsor.cli.summary import mission_rows, mission_values
+from sparsor.cli.summary import curve_table, mission_rows, mission_values
 
 if TYPE_CHECKING:
+    from sparsor.journeys.planning import PlannedMission
     from sparsor.mission.specification import MissionSpecification
 
 WHERE, PRIOR, SEARCH, FLIGHT = "Where", "What maps look like", "Search", "Flight"
@@ -97,8 +99,8 @@ def plan(
         str | None,
         _option(
             SEARCH,
-            "monte-carlo, the paper's Algorithm 1, or refined, the route of least expected error (default: "
-            "monte-carlo).",
+            "refined, the route of least expected error, or monte-carlo, the paper's Algorithm 1 (default: refined, "
+            "or monte-carlo where an option of Algorithm 1 is given).",
             "--planner",
             metavar="NAME",
         ),
@@ -120,6 +122,15 @@ def plan(
             metavar="LIMIT",
         ),
     ] = None,
+    pareto: Annotated[
+        bool,
+        typer.Option(
+            "--pareto",
+            help="Also plan for smaller and larger budgets, and write table and picture of the error to expect of each "
+            "(pareto.csv, pareto.png); takes about eight times as long.",
+            rich_help_panel=SEARCH,
+        ),
+    ] = False,
     rows: Annotated[int | None, _option(SEARCH, "Rows of the measurement matrix, M (default: 35).", "--rows")] = None,
     probability: Annotated[
         float | None,
@@ -259,14 +270,21 @@ def plan(
     from sparsor.core.cluster import workers_at
     from sparsor.journeys.advice import advice
     from sparsor.journeys.folder import check_folder, write_mission
+    from sparsor.journeys.pareto import curve_files, curve_rows, plan_with_curve
     from sparsor.journeys.planning import plan_mission
 
     check_folder(spec, folder, force=force)
+    curve: tuple[PlannedMission, ...] = ()
     with workers_at(scheduler, workers) as hands, progress_bar(talk) as progress:
-        mission = plan_mission(spec, workers=hands, progress=progress)
-    written = write_mission(mission, folder)
+        if pareto:
+            mission, curve = plan_with_curve(spec, workers=hands, progress=progress)
+        else:
+            mission = plan_mission(spec, workers=hands, progress=progress)
+    written = write_mission(mission, folder, beside=curve_files(mission, curve) if curve else None)
     result = mission_values(mission, folder)
     if as_json:
+        if curve:
+            result["pareto"] = curve_rows(curve)
         print_json(result)
         return
     # What says that a mission cannot fly, or is a slip, is said even to those who asked for quiet.
@@ -275,6 +293,8 @@ def plan(
         typer.echo(written[f"{spec.name}.plan"])
         return
     print_table(mission_rows(mission, details=talk is Talk.VERBOSE), spec.name)
+    if curve:
+        print_columns(*curve_table(mission, curve))
     typer.echo(f"written to {folder}: {', '.join(written)}")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from sparsor.journeys.planning import PlannedMission
@@ -94,3 +95,22 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             ),
         ]
     return table
+
+
+def curve_table(
+    mission: PlannedMission, curve: Sequence[PlannedMission]
+) -> tuple[tuple[str, ...], Sequence[tuple[str, ...]], str]:
+    """Return column names, rows and title of the curve of error against budget; the planned one is marked."""
+    names = ("budget", "km", "of full coverage", "min in the air", "flyable", "expected error")
+    rows = [
+        (
+            f"{'> ' if one is mission else ''}{one.specification.search.budget}",
+            f"{one.path_length_m / 1000:.2f}",
+            f"{one.coverage_fraction:.1%}",
+            f"{one.flight_time_s / 60:.1f}",
+            "yes" if one.flyable else "no",
+            f"{one.expected_relative_error:.3f}",
+        )
+        for one in curve
+    ]
+    return names, rows, "other budgets"

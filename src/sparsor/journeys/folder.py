@@ -13,6 +13,7 @@ from sparsor.mission.specification import read_specification, specification_toml
 from sparsor.vehicle import autopilot_named
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from sparsor.journeys.planning import PlannedMission
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 SPECIFICATION_FILE = "mission.toml"
 PREVIEW_FILE = "preview.png"
+CURVE_FILES = ("pareto.csv", "pareto.png")
 
 
 def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> None:
@@ -55,11 +57,22 @@ def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> No
     )
 
 
-def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True) -> dict[str, Path]:
+def write_mission(
+    mission: PlannedMission, folder: Path, *, preview: bool = True, beside: Mapping[str, bytes] | None = None
+) -> dict[str, Path]:
     """Write a mission's folder, all of its files or none; return what is where.
 
     What an earlier mission in the folder consisted of, by its mission.toml, and this one does not make, is
     removed, so that no old route lies beside the new one.
+
+    Parameters
+    ----------
+    mission : PlannedMission
+    folder : Path
+    preview : bool
+        Whether the picture is drawn.
+    beside : mapping of str to bytes, optional
+        Further files, by name.
 
     Raises
     ------
@@ -76,6 +89,7 @@ def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True
         from sparsor.journeys.preview import preview_png
 
         contents[PREVIEW_FILE] = preview_png(mission)
+    contents |= beside or {}
     inputs = {path.resolve() for path in spec.inputs}
     stale = {folder / file for file in _files_before(folder) - contents.keys()}
     write_files(folder, contents)
@@ -88,7 +102,7 @@ def write_mission(mission: PlannedMission, folder: Path, *, preview: bool = True
 def _files(spec: MissionSpecification) -> set[str]:
     """Return the names of the files that a mission consists of."""
     suffixes = ("plan", "npz", *spec.output.export)
-    return {SPECIFICATION_FILE, PREVIEW_FILE, *(f"{spec.name}.{suffix}" for suffix in suffixes)}
+    return {SPECIFICATION_FILE, PREVIEW_FILE, *CURVE_FILES, *(f"{spec.name}.{suffix}" for suffix in suffixes)}
 
 
 def _files_before(folder: Path) -> set[str]:

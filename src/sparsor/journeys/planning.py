@@ -5,60 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
-from sparsor.design import (
-    Budget,
-    LegTable,
-    Problem,
-    Weights,
-    fixed_sparsity,
-    parse_budget,
-    search,
-    searched_sparsity,
-)
+from sparsor.design import Weights
 from sparsor.design.expectation import expected_errors
-from sparsor.design.sparsity import check_sparsity
-from sparsor.design.tuning import comparable_weights, pilot
-from sparsor.errors import MissionError
-from sparsor.geodesy import BoundingBox, Grid
-from sparsor.geodesy.areas import Area, cells_inside, read_area
 from sparsor.geodesy.lengths import distance_m
 from sparsor.journeys.advice import advice
-from sparsor.journeys.modelling import PriorChoice, choose_prior
-from sparsor.journeys.refining import refined_task, search_refined
+from sparsor.journeys.algorithm1 import search_algorithm_1
+from sparsor.journeys.preparing import Place, Prepared, prepare
+from sparsor.journeys.refining import search_refined
 from sparsor.mission import Home, MissionPlan, build_mission
-from sparsor.mission.specification import PAPER_ROWS
-from sparsor.vehicle import (
-    Autopilot,
-    SensorProfile,
-    Vehicle,
-    autopilot_named,
-    flight_seconds,
-    load_sensor,
-    load_vehicle,
-    stop_seconds,
-    usable_seconds,
-)
+from sparsor.vehicle import Autopilot, SensorProfile, Vehicle, flight_seconds, usable_seconds
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.design import Candidate
-    from sparsor.design.monte_carlo import Sparsity
+    from sparsor.journeys.modelling import PriorChoice
     from sparsor.mission.specification import MissionSpecification
 
-
-@dataclass(frozen=True)
-class Place:
-    """Where a mission is flown: the grid, the area it was asked for, the cells inside."""
-
-    grid: Grid
-    area: Area | None
-    allowed: NDArray[np.bool_]
-    full_coverage_m: float
+_INTERRUPTED = "The search was interrupted: the route is the best that it had found by then."
 
 
 @dataclass(frozen=True)
@@ -142,149 +111,54 @@ def plan_mission(
     InputError
         When something asked for is wrong, or no route meets the budget.
     """
-    vehicle, autopilot = load_vehicle(spec.flight.vehicle), autopilot_named(spec.flight.autopilot)
-    sensor = _sensor(spec)
-    box, area = _where(spec)
     hands = workers_of(workers)
-    prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=hands, progress=progress)
-    place = _place(Grid(box, prior.model.shape), area)
-    legs = _legs(place, _speed(spec, vehicle))
-    problem = _problem(spec, prior, legs, _budget(spec, vehicle, autopilot, place))
+    prepared = prepare(spec, workers=hands, progress=progress)
+    return plan_prepared(spec, prepared, workers=hands, progress=progress)
+
+
+def plan_prepared(
+    spec: MissionSpecification,
+    prepared: Prepared,
+    *,
+    begin: Sequence[NDArray[np.int64]] = (),
+    workers: Workers | int = 1,
+    progress: Progress = silent,
+) -> PlannedMission:
+    """Plan a mission with what was prepared for it, or for it with another budget.
+
+    Parameters
+    ----------
+    spec : MissionSpecification
+    prepared : Prepared
+    begin : sequence of arrays of int64
+        Routes that the refined search may begin from.
+    workers : Workers or int
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        When no route meets the budget.
+    """
+    problem = prepared.problem(spec)
     if spec.search.planner == "refined":
-        weights = Weights()
-        speed = _speed(spec, vehicle)
-        hold_s = autopilot.written_hold_s(spec.flight.hold_s)
-        braking_s = stop_seconds(vehicle, hold_s, speed) - hold_s
-        assert sensor is not None
-        task = refined_task(prior.model, problem, sensor, hold_s=hold_s, braking_s=braking_s)
-        candidate, error = search_refined(task, spec, prior.model, workers=hands, progress=progress)
-        expected = (error, error)
-    else:
-        sparsity = _sparsity(spec, problem)
-        weights = _weights(spec, problem, sparsity)
-        candidate = search(
-            problem,
-            sparsity,
-            weights,
-            seed=spec.search.seed,
-            iterations=spec.search.iterations,
-            seconds=spec.search.time_s,
-            workers=hands,
-            progress=progress,
-        )
-        expected = expected_errors(problem, candidate, prior.model.mean)
-    return _assemble(spec, place, prior, vehicle, sensor, autopilot, problem, weights, candidate, expected)
-
-
-def _sensor(spec: MissionSpecification) -> SensorProfile | None:
-    """Return the sensor; the refined search plans for the packaged one where nothing is said, Algorithm 1 for none."""
-    if spec.sensor is None:
-        return load_sensor() if spec.search.planner == "refined" else None
-    if spec.sensor.profile is not None:
-        return load_sensor(spec.sensor.profile)
-    return load_sensor().model_copy(update={"t90_s": spec.sensor.t90_s})
-
-
-def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
-    if spec.area.bbox is not None:
-        return BoundingBox(*spec.area.bbox), None
-    assert spec.area.file is not None
-    area = read_area(spec.area.file)
-    return area.box, None if area.is_box else area
-
-
-def _place(grid: Grid, area: Area | None) -> Place:
-    allowed = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
-    if int(allowed.sum()) < 2:
-        raise MissionError("the area holds the centre of one cell only; draw a larger one")
-    return Place(grid, area, allowed, grid.full_coverage_m(allowed))
-
-
-def _speed(spec: MissionSpecification, vehicle: Vehicle) -> float:
-    return vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
-
-
-def _legs(place: Place, speed_m_s: float) -> LegTable:
-    length_m = place.grid.lengths_m()
-    cell_unit_m = place.full_coverage_m / (int(place.allowed.sum()) - 1)
-    return LegTable(place.grid.shape, length_m, length_m / speed_m_s, cell_unit_m, place.allowed).kept_inside()
-
-
-def _budget(spec: MissionSpecification, vehicle: Vehicle, autopilot: Autopilot, place: Place) -> Budget | None:
-    if spec.search.budget is None:
-        return None
-    asked = parse_budget(spec.search.budget)
-    if asked.measure == "fraction":
-        return Budget(asked.value * place.full_coverage_m, "distance")
-    if asked.measure == "distance":
-        return Budget(asked.value, "distance")
-    speed, hold_s = _speed(spec, vehicle), autopilot.written_hold_s(spec.flight.hold_s)
-    home = None
-    if spec.flight.home is not None:
-        home = distance_m(*spec.flight.home, *place.grid.centres_deg()) / speed
-    fixed = flight_seconds(
-        vehicle,
-        path_length_m=0.0,
-        transit_m=0.0,
-        stops=0,
-        hold_s=hold_s,
-        altitude_m=spec.flight.altitude_m,
-        speed_m_s=speed,
-    )
-    return Budget(asked.value, "time", stop_seconds(vehicle, hold_s, speed), fixed, home)
-
-
-def _problem(spec: MissionSpecification, prior: PriorChoice, legs: LegTable, budget: Budget | None) -> Problem:
-    model, asked = prior.model, spec.search
-    rows = asked.rows or PAPER_ROWS
-    check_sparsity(asked.probability, asked.theta, rows)
-    return Problem(
-        psi=model.dictionary,
-        maps=model.validation - model.mean,
-        lasso_weight=model.lasso_weight if asked.lasso is None else asked.lasso,
-        legs=legs,
-        rows=rows,
-        budget=budget,
-        unit_rows=not asked.paper,
-        improve=not asked.paper,
-    )
-
-
-def _sparsity(spec: MissionSpecification, problem: Problem) -> Sparsity:
-    asked = spec.search
-    if asked.probability is not None and asked.theta is not None:
-        return fixed_sparsity(asked.probability, asked.theta)
-    legs = problem.legs
-    cells = int(legs.allowed.sum())
-    stops = cells if problem.budget is None else problem.budget.stops_within(legs)
-    return searched_sparsity(stops, cells, problem.rows, probability=asked.probability, theta=asked.theta)
-
-
-def _weights(spec: MissionSpecification, problem: Problem, sparsity: Sparsity) -> Weights:
-    """Within a budget the path and the incoherence cost nothing unless their weights are given."""
-    asked = spec.search
-    valid = 1.0 if asked.lambda_valid is None else asked.lambda_valid
-    path, incoherence = asked.lambda_path, asked.lambda_incoh
-    if problem.budget is not None:
-        path, incoherence = path or 0.0, incoherence or 0.0
-    if path is not None and incoherence is not None:
-        return comparable_weights([], valid=valid, path=path, incoherence=incoherence)
-    drawn = pilot(problem, sparsity, seed=asked.seed)
-    return comparable_weights(drawn, valid=valid, path=path, incoherence=incoherence)
+        found = search_refined(prepared, problem, spec, begin=begin, workers=workers, progress=progress)
+        warnings = (_INTERRUPTED,) if found.interrupted else ()
+        return _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), warnings)
+    candidate, weights = search_algorithm_1(problem, spec, workers=workers, progress=progress)
+    expected = expected_errors(problem, candidate, prepared.prior.model.mean)
+    return _assemble(spec, prepared, candidate, weights, expected, ())
 
 
 def _assemble(
     spec: MissionSpecification,
-    place: Place,
-    prior: PriorChoice,
-    vehicle: Vehicle,
-    sensor: SensorProfile | None,
-    autopilot: Autopilot,
-    problem: Problem,
-    weights: Weights,
+    prepared: Prepared,
     candidate: Candidate,
+    weights: Weights,
     expected: tuple[float, float],
+    warnings: tuple[str, ...],
 ) -> PlannedMission:
+    place, prior, legs, vehicle = prepared.place, prepared.prior, prepared.legs, prepared.vehicle
     candidate = _nearer_end_first(spec, place, candidate)
     flight, stops = spec.flight, candidate.stops
     lon, lat = place.grid.centres_deg(stops)
@@ -292,14 +166,14 @@ def _assemble(
         lon,
         lat,
         vehicle=vehicle,
-        autopilot=autopilot,
+        autopilot=prepared.autopilot,
         altitude_m=flight.altitude_m,
         home=_home(spec, float(lon[0]), float(lat[0])),
         speed_m_s=flight.speed_m_s,
-        hold_s=_holds_s(flight.hold_s, candidate, autopilot),
+        hold_s=_holds_s(flight.hold_s, candidate, prepared.autopilot),
         fence_margin_m=flight.fence_margin_m,
     )
-    path_m = problem.legs.path_length(stops)
+    path_m = legs.path_length(stops)
     transit = distance_m(plan.home.lon_deg, plan.home.lat_deg, lon[[0, -1]], lat[[0, -1]]).sum()
     seconds = flight_seconds(
         vehicle,
@@ -308,26 +182,26 @@ def _assemble(
         stops=stops.size,
         hold_s=[stop.hold_s for stop in plan.stops],
         altitude_m=flight.altitude_m,
-        speed_m_s=_speed(spec, vehicle),
+        speed_m_s=prepared.speed_m_s,
     )
     mission = PlannedMission(
         specification=spec,
         place=place,
         prior=prior,
         vehicle=vehicle,
-        sensor=sensor,
+        sensor=prepared.sensor,
         candidate=candidate,
         weights=weights,
         plan=plan,
         path_length_m=path_m,
         flown_length_m=path_m + float(transit),
         flight_time_s=seconds,
-        cells_flown_over=problem.legs.cells_under(stops).size,
+        cells_flown_over=legs.cells_under(stops).size,
         expected_relative_error=expected[0] * prior.widening,
         expected_relative_error_cells=expected[1] * prior.widening,
         warnings=(),
     )
-    return replace(mission, warnings=(*advice(mission), *plan.warnings, *prior.warnings))
+    return replace(mission, warnings=(*warnings, *advice(mission), *plan.warnings, *prior.warnings))
 
 
 def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candidate) -> Candidate:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import one_blas_thread
 from sparsor.design import Candidate
 from sparsor.design.decoders import Measurements
@@ -14,15 +15,18 @@ from sparsor.design.decoders.covariance import training_covariance
 from sparsor.design.decoders.decode import DecoderName, candidates
 from sparsor.design.decoders.setting import Setting
 from sparsor.design.refined import Sensor, Task, refine
-from sparsor.errors import DesignError
+from sparsor.errors import BudgetError, DesignError
+from sparsor.journeys.algorithm1 import drawn_within
 from sparsor.prior.statistics import unit_shapes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from sparsor.core.progress import Progress
     from sparsor.core.workers import Workers
     from sparsor.design import LegTable, Problem
+    from sparsor.journeys.preparing import Prepared
     from sparsor.mission.specification import MissionSpecification
     from sparsor.prior.model import Model
     from sparsor.vehicle import SensorProfile
@@ -32,8 +36,28 @@ READING_NOISE = 0.05**2
 # Spread of a map over the noise of a reading: 13 ppb of NO2 about a city for the packaged sensor's 5 ppb. What is in
 # the air on the day nobody knows before the flight; a prior from column densities says nothing of it.
 SPREAD_OVER_NOISE: Final = 13.0 / 5.0
+_SAMPLES = 64  # of Algorithm 1: one start among many
 _T90_OVER_TAU = float(np.log(10.0))
 _LINEAR: tuple[DecoderName, ...] = ("kriging", "mmse", "blend")
+
+
+@dataclass(frozen=True)
+class Refined:
+    """What the refined search found.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Its Phi measures every cell flown over by itself.
+    error : float
+        To expect by the best linear decoder, see `linear_expectation`.
+    interrupted : bool
+        Whether the search was ended early.
+    """
+
+    candidate: Candidate
+    error: float
+    interrupted: bool
 
 
 def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_s: float, braking_s: float) -> Task:
@@ -61,26 +85,42 @@ def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_
 
 
 def search_refined(
-    task: Task, spec: MissionSpecification, model: Model, *, workers: Workers, progress: Progress
-) -> tuple[Candidate, float]:
-    """Return the route with the lowest expected error, and that error by the best linear decoder.
-
-    Its Phi measures every cell flown over by itself.
+    prepared: Prepared,
+    problem: Problem,
+    spec: MissionSpecification,
+    *,
+    begin: Sequence[NDArray[np.int64]] = (),
+    workers: Workers | int = 1,
+    progress: Progress = silent,
+) -> Refined:
+    """Return the route with the lowest expected error.
 
     Parameters
     ----------
-    task : Task
+    prepared : Prepared
+    problem : Problem
+        With the mission's budget.
     spec : MissionSpecification
-    model : Model
-    workers : Workers
+    begin : sequence of arrays of int64
+        Routes to begin from beside the search's own and Algorithm 1's.
+    workers : Workers or int
     progress : Progress
+
+    Raises
+    ------
+    BudgetError
+        When the budget is too small for any route.
     """
-    legs = task.legs
+    legs, model = prepared.legs, prepared.prior.model
+    assert prepared.sensor is not None
+    hold_s, braking_s = prepared.hold(spec)
+    task = refined_task(model, problem, prepared.sensor, hold_s=hold_s, braking_s=braking_s)
     route = refine(
         task,
         seed=spec.search.seed,
         iterations=spec.search.iterations,
         seconds=spec.search.time_s,
+        begin=(*begin, *_drawn(problem, spec.search.seed, workers)),
         workers=workers,
         progress=progress,
     )
@@ -88,7 +128,7 @@ def search_refined(
     phi = np.eye(legs.size, dtype=np.bool_)[legs.cells_under(stops)]
     inside = model.validation[:, legs.allowed]
     squared = route.expected_error * float(inside.var(axis=1).mean()) * inside.shape[1]
-    found = Candidate(
+    candidate = Candidate(
         sample=0,
         cost=squared,
         error=squared,
@@ -100,7 +140,16 @@ def search_refined(
         theta=0,
         dwells=dwells,
     )
-    return found, linear_expectation(model, legs, *task.readings(route.stops), spec.search.seed)
+    error = linear_expectation(model, legs, *task.readings(route.stops), spec.search.seed)
+    return Refined(candidate, error, route.interrupted)
+
+
+def _drawn(problem: Problem, seed: int, workers: Workers | int) -> list[NDArray[np.int64]]:
+    """Return the route of the best Phi of a few that Algorithm 1 draws, where one is within the budget."""
+    try:
+        return [drawn_within(problem, seed=seed, samples=_SAMPLES, workers=workers).stops]
+    except BudgetError:
+        return []
 
 
 def apart(stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

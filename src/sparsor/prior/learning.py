@@ -60,6 +60,11 @@ class TrainingMaps:
     source: str
     shapes: NDArray[np.float64] | None = None
 
+    def __post_init__(self) -> None:
+        low, high = float(self.training.min()), float(self.training.max())
+        if not high > low:
+            raise ModelError(f"{self.source}: the training windows hold one value only, {low:g}: nothing to learn")
+
 
 def maps_of_fields(
     fields: Sequence[Field], sets: Sequence[MapSet], shape: tuple[int, int], progress: Progress = silent
@@ -170,8 +175,6 @@ def untuned_model(
         When the maps have no contrast, or the number of atoms is out of range.
     """
     low, high = float(maps.training.min()), float(maps.training.max())
-    if not high > low:
-        raise ModelError(f"{maps.source}: the training windows hold one value only, {low:g}: nothing to learn")
     training, validation = ((part - low) / (high - low) for part in (maps.training, maps.validation))
     if not (np.ptp(validation, axis=1) > 0).any():
         raise ModelError(f"{maps.source}: the validation windows have no contrast: nothing can be judged on them")

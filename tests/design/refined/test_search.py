@@ -146,7 +146,7 @@ def test_rankings_name_each_cell_once():
 
 
 def test_what_cannot_be_searched_is_refused():
-    with pytest.raises(BudgetError, match="no route of two cells"):
+    with pytest.raises(BudgetError, match="the shortest of two cells takes 1 m"):
         refine(task(budget=Budget(0.5, "distance")), seed=0)
     with pytest.raises(DesignError, match="at least 10"):
         refine(task(), seed=0, iterations=3)

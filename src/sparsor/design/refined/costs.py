@@ -57,3 +57,12 @@ def used(costs: Costs, stops: NDArray[np.int64]) -> float:
     for k in range(stops.size - 1):
         total += costs.legs[stops[k], stops[k + 1]]
     return float(total + costs.per_stop * stops.size)
+
+
+def shortest_pair(costs: Costs, allowed: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the route of two cells that uses least."""
+    cells = np.flatnonzero(allowed)
+    total = costs.legs[np.ix_(cells, cells)] + costs.ends[cells, None] + costs.ends[cells]
+    total += costs.closing * total.T
+    np.fill_diagonal(total, np.inf)
+    return cells[np.array(np.unravel_index(total.argmin(), total.shape))].astype(np.int64)

@@ -19,7 +19,7 @@ from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
 from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.refined.annealing import anneal, route_error
-from sparsor.design.refined.costs import costs, used
+from sparsor.design.refined.costs import costs, shortest_pair, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.flyover import flyover, passes
 from sparsor.design.refined.posterior import belief
@@ -217,14 +217,19 @@ class _Search:
 
     def from_starts(self, begin: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Return the best route that all stages find from the starts."""
-        routes = [*begin, *starts(self.beliefs[-1], self.costs, self.task.legs.shape, self.task.reading_noise)]
+        pair = shortest_pair(self.costs, self.task.legs.allowed)
+        routes = [*begin, pair, *starts(self.beliefs[-1], self.costs, self.task.legs.shape, self.task.reading_noise)]
         routes = [stops for stops in routes if self.fits(stops)]
         if not routes:
             say = self.task.budget.describe
-            raise BudgetError(f"no route of two cells or more within {say(self.costs.limit)}: allow a larger --budget")
+            raise BudgetError(
+                f"no route within {say(self.costs.limit)}: the shortest of two cells takes "
+                f"{say(used(self.costs, pair))}. Allow a larger --budget"
+            )
+        found = routes
         for level, stage in enumerate(_STAGES):
-            routes = self.anneal_all(0, level, self.ranked(routes, level)[: stage.chains])
-        return self.ranked(routes, len(_STAGES) - 1)[0]
+            found = self.anneal_all(0, level, self.ranked(found, level)[: stage.chains])
+        return self.ranked([*found, *routes], len(_STAGES) - 1)[0]
 
     def again(self, turn: int, best: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return what the last stage makes of a route on other streams; it is no worse."""

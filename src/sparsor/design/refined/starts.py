@@ -1,4 +1,4 @@
-"""Routes to begin the search from: lawnmowers, and tours of the cells that say most."""
+"""Routes to begin the search from: lawnmowers, and tours of the cells that say most or of points placed by gradient."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.design.refined.costs import used
+from sparsor.design.refined.inducing import inducing_tour
 from sparsor.design.route import shortest_path
 
 if TYPE_CHECKING:
@@ -23,13 +24,14 @@ _ROUNDING = 1e-12
 
 
 def starts(prior: Belief, costs: Costs, shape: tuple[int, int], noise: float) -> list[NDArray[np.int64]]:
-    """Return routes within the budget, each of another kind: lawnmowers, and tours of ranked cells."""
-    found = [*_lawnmowers(prior, costs, shape)]
-    for ranking in (pivots(prior, noise), most_telling(prior, noise)):
-        tour = tour_within(ranking, costs)
-        if tour is not None:
-            found.append(tour)
-    return found
+    """Return routes within the budget, each of another kind: lawnmowers, tours of ranked cells, of inducing points."""
+    telling = most_telling(prior, noise)
+    tours = (
+        tour_within(pivots(prior, noise), costs),
+        tour_within(telling, costs),
+        inducing_tour(prior, costs, shape, noise, telling),
+    )
+    return [*_lawnmowers(prior, costs, shape), *(tour for tour in tours if tour is not None)]
 
 
 def pivots(prior: Belief, noise: float) -> NDArray[np.int64]:
