@@ -38,7 +38,7 @@ READING_NOISE = 0.05**2
 SPREAD_OVER_NOISE: Final = 13.0 / 5.0
 _SAMPLES = 64  # of Algorithm 1: one start among many
 _T90_OVER_TAU = float(np.log(10.0))
-_LINEAR: tuple[DecoderName, ...] = ("kriging", "mmse", "blend")
+LINEAR: Final[tuple[DecoderName, ...]] = ("kriging", "mmse", "blend")
 
 
 @dataclass(frozen=True)
@@ -188,4 +188,4 @@ def linear_expectation(
     readings = Measurements(rows, rows @ maps[0], variance)
     setting = Setting(model, readings, legs.allowed, np.zeros(len(rows)), seed)
     with one_blas_thread():
-        return min(one.error for one in candidates(setting, _LINEAR, amplitude=1.0).values())
+        return min(one.error for one in candidates(setting, LINEAR, amplitude=1.0).values())
