@@ -31,6 +31,10 @@ class FieldError(InputError):
     """A field of training values that cannot be read or used."""
 
 
+class EmptyFieldError(FieldError):
+    """A field of nothing but gaps, or with gaps in every window."""
+
+
 class ModelError(InputError):
     """A model file that cannot be read, or that does not fit what is asked of it."""
 

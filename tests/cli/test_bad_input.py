@@ -234,3 +234,15 @@ def test_verbose_adds_the_traceback_and_keeps_the_code(console):
     assert ran.code == 2
     assert "Traceback" in ran.err
     assert ran.err.splitlines()[-1].startswith("error: unknown vehicle 'zeppelin'")
+
+
+@pytest.mark.parametrize("command", ["generate-mission", "learn"])
+def test_a_scheduler_that_does_not_answer_is_named(console, smooth_field, tree, command):
+    before = tree()
+    if command == "learn":
+        ran = console("sparsor", "learn", smooth_field, "-o", "m.npz", "--scheduler", "tcp://127.0.0.1:9")
+    else:
+        ran = console.mission("--scheduler", "tcp://127.0.0.1:9")
+    assert ran.code == 2
+    assert "no dask scheduler answers at 'tcp://127.0.0.1:9'" in ran.err
+    assert tree() == before

@@ -65,7 +65,7 @@ def test_a_worker_that_is_killed_costs_time_and_nothing_else(two):
         time.sleep(0.05)
         return part
 
-    processes = set(two._client.run(os.getpid).values())
+    processes = set(two.processes())
     left, results = sorted(processes), []
     for result in two.map(call, two.share(slowly), range(24)):
         results.append(result)
@@ -73,7 +73,7 @@ def test_a_worker_that_is_killed_costs_time_and_nothing_else(two):
             os.kill(left.pop(), signal.SIGKILL)
     assert results == list(range(24))
     two._client.wait_for_workers(2)
-    assert not set(two._client.run(os.getpid).values()) & processes
+    assert not set(two.processes()) & processes
 
 
 def test_a_part_that_kills_its_workers_is_given_up():

@@ -80,13 +80,13 @@ def test_the_covariance_is_learned_from_dense_windows_west_of_all_validation_win
     rng = np.random.default_rng(1)
     field = replace(longitudes(100, 160), values=rng.normal(size=(100, 160)))
     windows = ground_windows(field, 60_000, 50_000, (4, 5))
-    parts = maps_of_fields([field], [windows], (4, 5))
+    parts = maps_of_fields([(field, windows)], (4, 5))
     held_west = windows.west[windows.column > windows.column.max() - round(0.15 * (windows.column.max() + 1))].min()
     # Whatever lies in the east, under the validation windows, is not seen.
     values = field.values.copy()
     values[:, int(np.ceil(held_west)) :] = 9e9
     elsewhere = replace(field, values=values)
-    np.testing.assert_array_equal(maps_of_fields([elsewhere], [windows], (4, 5)).shapes, parts.shapes)
+    np.testing.assert_array_equal(maps_of_fields([(elsewhere, windows)], (4, 5)).shapes, parts.shapes)
     assert not np.allclose(parts.shapes, shape_covariance([parts.training]), atol=0.02)
     model = untuned_model(parts, atoms=8, dictionary="polynomial")
     np.testing.assert_allclose(model.covariance_factor @ model.covariance_factor.T, parts.shapes, atol=1e-9)

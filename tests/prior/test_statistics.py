@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sparsor.errors import ModelError
-from sparsor.prior.statistics import Kernel, covariance_factor, fit_kernel, shape_covariance, variogram
+from sparsor.prior.statistics import Kernel, covariance_factor, fit_kernel, shape_covariance, unit_shapes, variogram
 
 SHAPE = (16, 18)
 LAGS = np.arange(1, 9)
@@ -157,12 +157,15 @@ def test_of_many_components_the_leading_384_are_kept_largest_first():
     np.testing.assert_allclose(np.linalg.norm(left), np.linalg.norm(values[384:]), rtol=1e-8)
 
 
-def test_shapes_know_neither_level_nor_amplitude():
+def test_shapes_know_no_level_and_count_as_much_as_their_spread():
     rng = np.random.default_rng(4)
     maps = exponential_maps(3.0, count=9)
     level, amplitude = rng.normal(size=(9, 1)), rng.uniform(0.1, 9.0, (9, 1))
-    expected = shape_covariance([maps])
+    spread = amplitude[:, 0] * maps.std(axis=1)
+    shapes = unit_shapes(maps)
+    expected = np.einsum("k,ki,kj->ij", spread / spread.sum(), shapes, shapes)
     np.testing.assert_allclose(shape_covariance([level + amplitude * maps]), expected, atol=1e-9)
+    np.testing.assert_allclose(shape_covariance([7.0 * (level + amplitude * maps)]), expected, atol=1e-9)
     assert np.trace(expected) == pytest.approx(288)
     np.testing.assert_allclose(expected.sum(axis=0), 0.0, atol=1e-9)
 

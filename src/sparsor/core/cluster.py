@@ -42,10 +42,13 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 3,  # a part that took three workers down with it is at fault
     "distributed.admin.large-graph-warning-threshold": "1GB",  # what is shared travels in the graph, on purpose
+    "distributed.scheduler.active-memory-manager.start": False,  # what is shared stays with all workers
     "distributed.worker.profile.enabled": False,
     # Without dask's MALLOC_TRIM_THRESHOLD_, with which memory goes back to the system and is asked for again all the
     # time: a third more seconds for Algorithm 1.
     "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
+    # A Ctrl-C goes to all processes of a terminal: it is for us, who may still want what the workers have found.
+    "distributed.worker.preload": ["import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"],
     "distributed.comm.timeouts.connect": _ANSWER_S,
 }
 
@@ -106,8 +109,14 @@ class Cluster:
         """
         import cloudpickle
 
-        name = uuid.uuid4().hex
-        return Shared((name, self._submit(_as_it_is, cloudpickle.dumps(given))))
+        name, held = uuid.uuid4().hex, self._submit(_as_it_is, cloudpickle.dumps(given))
+        with self._failures():
+            self._client.replicate([held])  # else the first parts all go to the worker that has it
+        return Shared((name, held))
+
+    def processes(self) -> list[int]:
+        """Return the numbers of the workers' processes."""
+        return list(self._client.run(os.getpid).values())
 
     def map(
         self, function: Callable[[Given, Part], Result], shared: Shared[Given], parts: Iterable[Part]

@@ -11,17 +11,15 @@ from sparsor.core.workers import Workers, workers_of
 from sparsor.errors import FieldError, ModelError
 from sparsor.geodesy import BoundingBox
 from sparsor.journeys.modelling import learn_model, representation_error, with_sources
+from sparsor.prior.archive import FieldFile, maps_of_files
 from sparsor.prior.builtin import SHAPE
 from sparsor.prior.dictionary import DictionaryName
-from sparsor.prior.learning import DEFAULT_ATOMS, maps_of_fields
+from sparsor.prior.learning import DEFAULT_ATOMS
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz
-from sparsor.prior.reading import read_field
-from sparsor.prior.windows import ground_windows, nearest_resolved_m
+from sparsor.prior.windows import nearest_resolved_m
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from sparsor.prior.field import Field
 
 _SMALLEST_M = 1.0  # asks for windows of no size: the answer is the smallest that the field resolves
 
@@ -38,7 +36,7 @@ class LearnRequest:
     bbox : tuple of float, optional
         West, south, east, north in degrees.
     variable, time, field_bbox, field_colormap, field_range
-        As `sparsor.prior.reading.read_field` takes them.
+        As `sparsor.prior.archive.FieldFile` takes them.
     atoms : int
     dictionary : str
     centred : bool
@@ -106,17 +104,19 @@ def learn_from_fields(
         raise ModelError(f"dictionary '{request.dictionary}'; known are {', '.join(get_args(DictionaryName))}")
     if output.suffix != ".npz":
         raise ModelError(f"'{output}' has to end in .npz")
-    fields = _read(request)
+    files = [_file(path, request) for path in request.fields]
     asked = _asked_m(request)
     window_m = asked or (_SMALLEST_M, _SMALLEST_M)
-    for field in fields:  # the size that all of them resolve
+    sources: dict[Path, str] = {}
+    notes: list[str] = []
+    for file in files:  # the size that all of them resolve
+        field = file.first()
         window_m = nearest_resolved_m(field, *window_m, SHAPE)
-    sets = []
-    for done, field in enumerate(fields, start=1):
-        sets.append(ground_windows(field, *window_m, SHAPE))
-        progress("cutting windows", done, len(fields))
+        sources[file.path] = file.source(field)
+        notes += field.notes
+    maps, cut = maps_of_files(files, window_m, SHAPE, progress)
     model = learn_model(
-        maps_of_fields(fields, sets, SHAPE, progress),
+        maps,
         atoms=request.atoms,
         centred=request.centred,
         dictionary=cast("DictionaryName", request.dictionary),
@@ -124,31 +124,23 @@ def learn_from_fields(
         workers=workers_of(workers),
         progress=progress,
     )
-    content = arrays_to_npz(model_arrays(with_sources(model, dict(zip(request.fields, fields, strict=True)))))
+    content = arrays_to_npz(model_arrays(with_sources(model, sources)))
     write_file(output, content)
     model = model_from_npz(content, f"'{output}'")
     return LearnedModel(
         model=model,
-        maps=sum(len(one.maps) for one in sets),
-        dropped=sum(one.dropped for one in sets),
-        filled=sum(one.filled for one in sets),
+        maps=cut.maps,
+        dropped=cut.dropped,
+        filled=cut.filled,
         validation_relative_error=representation_error(model),
-        warnings=(*(note for field in fields for note in field.notes), *_said(request, asked, model)),
+        warnings=(*notes, *cut.words, *_said(request, asked, model)),
     )
 
 
-def _read(request: LearnRequest) -> list[Field]:
-    return [
-        read_field(
-            path,
-            variable=request.variable,
-            time=request.time,
-            box=request.field_bbox,
-            colormap=request.field_colormap,
-            value_range=request.field_range,
-        )
-        for path in request.fields
-    ]
+def _file(path: Path, request: LearnRequest) -> FieldFile:
+    return FieldFile(
+        path, request.variable, request.time, request.field_bbox, request.field_colormap, request.field_range
+    )
 
 
 def _asked_m(request: LearnRequest) -> tuple[float, float] | None:

@@ -20,6 +20,7 @@ from sparsor.design import unit_legs
 from sparsor.design.lars import lasso
 from sparsor.design.tuning import choose_lasso_weight
 from sparsor.errors import ModelError, OutputError
+from sparsor.prior.archive import FieldFile, maps_of_files
 from sparsor.prior.builtin import (
     SEED,
     SHAPE,
@@ -29,13 +30,12 @@ from sparsor.prior.builtin import (
     builtin_model,
     nearest_side_m,
 )
-from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, maps_of_fields, untuned_model
+from sparsor.prior.learning import DEFAULT_ATOMS, TrainingMaps, untuned_model
 from sparsor.prior.mismatch import mismatch_factor
 from sparsor.prior.model import Model, arrays_to_npz, model_arrays, model_from_npz, read_model
-from sparsor.prior.reading import read_field
 from sparsor.prior.resampling import sample_at
 from sparsor.prior.synthetic import covers
-from sparsor.prior.windows import ground_windows, nearest_resolved_m
+from sparsor.prior.windows import nearest_resolved_m
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from sparsor.prior.field import Field
 
 # Bumped whenever learning gives other models, so that cached ones are not taken for them.
-_LEARNING_VERSION = 2
+_LEARNING_VERSION = 3
 _SAME_SIZE = 1.02
 _BETWEEN_SIDES = 1.6  # no box between the built-in sizes is further from one than this
 
@@ -149,10 +149,10 @@ def representation_error(model: Model) -> float:
     return float(np.nanmean(centred_relative_error(model.validation, coded @ model.dictionary.T + model.mean)))
 
 
-def with_sources(model: Model, fields: Mapping[Path, Field]) -> Model:
+def with_sources(model: Model, sources: Mapping[Path, str]) -> Model:
     """Return a model that names the files it was learned from: by name and contents, not by where they lay."""
     names = [
-        f"{field.source.replace(str(path), path.name)}, sha256 {sha256_of(path)[:16]}" for path, field in fields.items()
+        f"{source.replace(str(path), path.name)}, sha256 {sha256_of(path)[:16]}" for path, source in sources.items()
     ]
     return replace(model, provenance={**model.provenance, "source": "; ".join(names)})
 
@@ -210,14 +210,15 @@ def _from_field(
     request: PriorSection, box: BoundingBox, atoms: int, *, paper: bool, workers: Workers | int, progress: Progress
 ) -> PriorChoice:
     assert request.field is not None
-    field = read_field(
+    file = FieldFile(
         request.field,
-        variable=request.variable,
-        time=request.time,
-        box=request.field_bbox,
-        colormap=request.field_colormap,
-        value_range=request.field_range,
+        request.variable,
+        request.time,
+        request.field_bbox,
+        request.field_colormap,
+        request.field_range,
     )
+    field = file.first()
     window_m = nearest_resolved_m(field, box.east_m, box.north_m, SHAPE)
     key = {
         **request.model_dump(mode="json", exclude={"field", "model"}),
@@ -228,14 +229,11 @@ def _from_field(
     }
 
     def learn() -> Model:
-        progress("cutting windows", 0, 1)
-        windows = ground_windows(field, *window_m, SHAPE)
-        progress("cutting windows", 1, 1)
-        maps = maps_of_fields([field], [windows], SHAPE, progress)
+        maps, _ = maps_of_files([file], window_m, SHAPE, progress)
         return learn_model(maps, atoms=atoms, centred=not paper, workers=workers, progress=progress)
 
     model = _cached(key, learn)
-    model = with_sources(model, {request.field: field})
+    model = with_sources(model, {request.field: file.source(field)})
     widening, said = size_difference(model, box)
     notes = [*field.notes, *said]
     if not np.isfinite(sample_at(field, box.centre_lon_deg, box.centre_lat_deg)):

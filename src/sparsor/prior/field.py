@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.errors import FieldError
+from sparsor.errors import EmptyFieldError, FieldError
+from sparsor.prior.raster import LazyRaster, OnFile
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,8 +22,8 @@ class Field:
 
     Parameters
     ----------
-    values : array of float64 (rows, columns)
-        Row 0 is the northmost; gaps are NaN.
+    values : array of float64 (rows, columns), or LazyRaster
+        Row 0 is the northmost; gaps are NaN. Lazy values are read as windows are cut from them.
     lon_deg : array of float64 (columns,)
         Pixel centres, ascending by a constant step; may run beyond 180 where the raster crosses the
         antimeridian.
@@ -41,7 +42,7 @@ class Field:
         When shapes disagree, a coordinate is not regular, or there is not one finite value.
     """
 
-    values: NDArray[np.float64]
+    values: NDArray[np.float64] | LazyRaster
     lon_deg: NDArray[np.float64]
     lat_deg: NDArray[np.float64]
     unit: str
@@ -59,8 +60,9 @@ class Field:
             raise FieldError(f"{self.source}: a field of {rows} x {columns} pixels is too small; 2 x 2 is the least")
         _check_regular(self.lon_deg, "longitudes", 1, self.source)
         _check_regular(self.lat_deg, "latitudes", -1, self.source)
-        if not np.isfinite(self.values).any():
-            raise FieldError(
+        # Whether a lazy raster is empty its windows will tell.
+        if isinstance(self.values, np.ndarray) and not np.isfinite(self.values).any():
+            raise EmptyFieldError(
                 f"{self.source}: the field is empty: not one of its {self.values.size} values is finite; "
                 "give a raster with data, and check its no-data value"
             )
@@ -86,16 +88,31 @@ class Field:
     def west_of(self, pixels: float) -> Field:
         """Return the part west of a line, `pixels` from the west edge; pixels on the line are left out."""
         columns = int(pixels + 1e-6)
-        return replace(self, values=self.values[:, :columns], lon_deg=self.lon_deg[:columns])
+        values = self.values
+        values = values.west_part(columns) if isinstance(values, LazyRaster) else values[:, :columns]
+        return replace(self, values=values, lon_deg=self.lon_deg[:columns])
 
     @property
     def gap_fraction(self) -> float:
         """Share of the pixels without a finite value."""
-        return float(1.0 - np.isfinite(self.values).mean())
+        return float(1.0 - np.isfinite(self.in_memory).mean())
+
+    @property
+    def in_memory(self) -> NDArray[np.float64]:
+        """All values.
+
+        Raises
+        ------
+        FieldError
+            When there are too many.
+        """
+        if isinstance(self.values, LazyRaster):
+            check_pixel_count(*self.values.shape, self.source)
+        return self.values[:, :]
 
 
 def field_on_axes(
-    values: ArrayLike,
+    values: ArrayLike | OnFile,
     lon_deg: ArrayLike,
     lat_deg: ArrayLike,
     *,
@@ -107,7 +124,7 @@ def field_on_axes(
 
     Parameters
     ----------
-    values : array_like (rows, columns)
+    values : array_like (rows, columns), or OnFile
         Infinite values become gaps.
     lon_deg : array_like (columns,)
         Pixel centres, west to east or east to west; the seam may lie anywhere.
@@ -127,8 +144,6 @@ def field_on_axes(
     >>> field.lon_deg.tolist(), field.lat_deg.tolist(), field.values.tolist()
     ([-160.0, -159.0], [11.0, 10.0], [[3.0, 4.0], [1.0, 2.0]])
     """
-    array = np.asarray(values, dtype=np.float64)
-    array = np.where(np.isfinite(array), array, np.nan)
     lon = np.unwrap(np.asarray(lon_deg, dtype=np.float64), period=360.0)
     lat = np.asarray(lat_deg, dtype=np.float64)
     if not (np.isfinite(lon).all() and np.isfinite(lat).all() and np.abs(lat).max(initial=0.0) <= 90.001):
@@ -136,12 +151,19 @@ def field_on_axes(
             f"{source}: its latitudes or longitudes are not degrees (latitudes of -90..90 are); "
             "reproject it first, e.g. with gdalwarp -t_srs EPSG:4326"
         )
+    rows, columns = np.arange(lat.size), np.arange(lon.size)
     if lon.size > 1 and lon[0] > lon[-1]:
-        array, lon = array[:, ::-1], lon[::-1]
+        columns, lon = columns[::-1], lon[::-1]
     if lat.size > 1 and lat[0] < lat[-1]:
-        array, lat = array[::-1], lat[::-1]
-    array, lon = _from_antimeridian(array, lon)
-    return Field(np.ascontiguousarray(array), lon.copy(), lat.copy(), unit, source, notes)
+        rows, lat = rows[::-1], lat[::-1]
+    columns, lon = _from_antimeridian(columns, lon)
+    if isinstance(values, OnFile):
+        return Field(LazyRaster(values.read, rows, columns, values.block), lon.copy(), lat.copy(), unit, source, notes)
+    array = np.asarray(values, dtype=np.float64)
+    array = np.where(np.isfinite(array), array, np.nan)
+    if array.shape == (rows.size, np.asarray(lon_deg).size):  # else the field says that they do not fit
+        array = np.ascontiguousarray(array[np.ix_(rows, columns)])
+    return Field(array, lon.copy(), lat.copy(), unit, source, notes)
 
 
 def check_pixel_count(rows: int, columns: int, source: str) -> None:
@@ -161,22 +183,22 @@ def check_pixel_count(rows: int, columns: int, source: str) -> None:
 
 
 def _from_antimeridian(
-    values: NDArray[np.float64], lon: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    columns: NDArray[np.int64], lon: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Begin in -180..180; a raster all round the world begins at its first pixel east of -180."""
     if lon.size < 2:
-        return values, lon
+        return columns, lon
     step = (lon[-1] - lon[0]) / (lon.size - 1)
     round_the_world = round(360.0 / step) if step > 0 else 0
     if lon.size >= round_the_world > 1 and abs(round_the_world * step - 360.0) < step / 2:
-        values, lon = values[:, :round_the_world], lon[:round_the_world]  # some files repeat the first column
+        columns, lon = columns[:round_the_world], lon[:round_the_world]  # some files repeat the first column
         first = int(np.argmin((lon + 180.0 + step * 1e-6) % 360.0))
-        values = np.roll(values, -first, axis=1)
+        columns = np.roll(columns, -first)
         lon = lon - lon[0] + (lon[first] + 180.0 + step * 1e-6) % 360.0 - 180.0 - step * 1e-6
-        return values, lon
+        return columns, lon
     turns = np.floor((lon[0] + 180.0 + step * 1e-6) / 360.0)
     # A turn back only when the raster begins beyond the antimeridian: 170..190 stays as it is.
-    return values, lon - 360.0 * turns
+    return columns, lon - 360.0 * turns
 
 
 def _check_regular(coordinate: NDArray[np.float64], name: str, sign: int, source: str) -> None:

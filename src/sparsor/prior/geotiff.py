@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sparsor.errors import FieldError
 from sparsor.prior.field import check_pixel_count, field_on_axes
+from sparsor.prior.raster import LAZY_PIXELS, OnFile
 from sparsor.prior.reprojection import Band, is_lon_lat, reprojected
 
 if TYPE_CHECKING:
@@ -26,7 +28,11 @@ PLACE_IT = "place it with --field-bbox W S E N, or write its CRS into it, e.g. w
 
 
 def read_geotiff(
-    path: Path, *, variable: str | None = None, box: tuple[float, float, float, float] | None = None
+    path: Path,
+    *,
+    variable: str | None = None,
+    box: tuple[float, float, float, float] | None = None,
+    lazily: bool = False,
 ) -> Field:
     """Return one band of a raster as a field.
 
@@ -39,6 +45,8 @@ def read_geotiff(
         Name (band description) or number, from 1, of the band; needed where there are several.
     box : tuple of float, optional
         West, south, east, north in degrees of the outer edges: places a raster that has no CRS.
+    lazily : bool
+        Leave a large raster on file until windows are cut from it. One that has to be resampled is read.
 
     Returns
     -------
@@ -50,13 +58,13 @@ def read_geotiff(
     FieldError
         When GDAL cannot read it, it is not georeferenced, the band is unknown, or everything is a gap.
     """
-    band = _read_band(path, variable, placed=box is not None)
+    band = _read_band(path, variable, placed=box is not None, lazily=lazily)
     if box is not None:
         over = axes_over(box, band.values.shape, band.source)
         return field_on_axes(band.values, *over, unit=band.unit, source=band.source)
     with _gdal_errors(path):
         if not is_lon_lat(band):
-            return reprojected(band, path)
+            return reprojected(_read_band(path, variable, placed=False), path)
     rows, columns = band.values.shape
     lon_deg = band.transform.c + (np.arange(columns) + 0.5) * band.transform.a
     lat_deg = band.transform.f + (np.arange(rows) + 0.5) * band.transform.e
@@ -109,24 +117,35 @@ def _gdal_errors(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _read_band(path: Path, variable: str | None, *, placed: bool) -> Band:
+def _read_band(path: Path, variable: str | None, *, placed: bool, lazily: bool = False) -> Band:
     import rasterio
 
-    with _gdal_errors(path), rasterio.open(path) as dataset:
+    with _gdal_errors(path), ExitStack() as closing:
+        dataset = closing.enter_context(rasterio.open(path))
         if not placed:
             _check_georeferenced(dataset, path)
         elif dataset.crs is not None:
             raise FieldError(f"{path} says itself where it lies; leave --field-bbox out")
         number = _band_number(dataset, variable, path)
-        check_pixel_count(dataset.height, dataset.width, str(path))
-        masked = dataset.read(number, masked=True)
-        if masked.dtype.kind not in "iuf":
-            raise FieldError(f"{path}: band {number} holds {masked.dtype} values; real numbers are needed")
-        raw = np.where(np.ma.getmaskarray(masked), np.nan, masked.data.astype(np.float64))
-        values = raw * dataset.scales[number - 1] + dataset.offsets[number - 1]
         name = dataset.descriptions[number - 1] or f"band {number}"
         source = f"{path}" if dataset.count == 1 else f"{path}: {name}"
-        return Band(values, dataset.crs, dataset.transform, _unit_of(dataset, number), source)
+        about = (dataset.crs, dataset.transform, _unit_of(dataset, number), source)
+        read = partial(_values, dataset, number, path)
+        if lazily and dataset.height * dataset.width > LAZY_PIXELS:
+            closing.pop_all()  # it stays open as long as the field is there
+            return Band(OnFile((dataset.height, dataset.width), read), *about)
+        check_pixel_count(dataset.height, dataset.width, str(path))
+        return Band(read(slice(0, dataset.height), slice(0, dataset.width)), *about)
+
+
+def _values(dataset: DatasetReader, number: int, path: Path, rows: slice, columns: slice) -> NDArray[np.float64]:
+    """Return a part of a band; gaps are NaN."""
+    with _gdal_errors(path):
+        masked = dataset.read(number, masked=True, window=((rows.start, rows.stop), (columns.start, columns.stop)))
+    if masked.dtype.kind not in "iuf":
+        raise FieldError(f"{path}: band {number} holds {masked.dtype} values; real numbers are needed")
+    raw = np.where(np.ma.getmaskarray(masked), np.nan, masked.data.astype(np.float64))
+    return np.asarray(raw * dataset.scales[number - 1] + dataset.offsets[number - 1])
 
 
 def _check_georeferenced(dataset: DatasetReader, path: Path) -> None:

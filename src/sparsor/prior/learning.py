@@ -16,11 +16,12 @@ from sparsor.prior.dictionary import (
     polynomial_dictionary,
 )
 from sparsor.prior.model import Model
-from sparsor.prior.statistics import covariance_factor, fit_kernel, shape_covariance
+from sparsor.prior.reservoir import Reservoir
+from sparsor.prior.statistics import ShapeCovariance, covariance_factor, fit_kernel, shape_covariance
 from sparsor.prior.windows import MapSet, ground_windows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -31,6 +32,8 @@ _VALIDATION_SHARE = 0.15
 _OVERLAP_COLUMNS = 3  # windows a quarter side apart overlap as far as this
 _MOST_VALIDATION = 56  # maps the search scores candidates on: 5 % of the paper's 1120
 _FEWEST_MAPS = 8
+MOST_TRAINING = 8192  # as many as one field gives: 64 MB
+_MOST_HELD = 2048  # validation windows from which the 56 are taken
 # Windows a sixteenth of a side apart give up to 13 % less error than a quarter apart, closer ones no less: see
 # docs/decisions/0012-refined-search.md.
 _DENSE_PER_SIDE = 16
@@ -50,6 +53,10 @@ class TrainingMaps:
     unit, source : str
     shapes : array of float64 (N, N), optional
         Covariance of shapes (see `shape_covariance`) of more windows than those for training; None: of these.
+    extremes : tuple of float, optional
+        Least and largest value of all training windows, where `training` is a sample of them; None: of these.
+    windows : int, optional
+        How many training windows there were, where `training` is a sample of them.
     """
 
     training: NDArray[np.float64]
@@ -59,73 +66,101 @@ class TrainingMaps:
     unit: str
     source: str
     shapes: NDArray[np.float64] | None = None
+    extremes: tuple[float, float] | None = None
+    windows: int | None = None
 
     def __post_init__(self) -> None:
-        low, high = float(self.training.min()), float(self.training.max())
+        low, high = self.span
         if not high > low:
             raise ModelError(f"{self.source}: the training windows hold one value only, {low:g}: nothing to learn")
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value of the training windows."""
+        return self.extremes or (float(self.training.min()), float(self.training.max()))
+
 
 def maps_of_fields(
-    fields: Sequence[Field], sets: Sequence[MapSet], shape: tuple[int, int], progress: Progress = silent
+    fields: Iterable[tuple[Field, MapSet]], shape: tuple[int, int], progress: Progress = silent, count: int = 1
 ) -> TrainingMaps:
     """Split the windows of fields, and lay more of them for the covariance, none on ground kept for validation.
 
     Parameters
     ----------
-    fields : sequence of Field
-    sets : sequence of MapSet
-        Windows of each, from `ground_windows`.
+    fields : iterable of (Field, MapSet)
+        Fields and windows of each, from `ground_windows`. Taken one by one: what is kept of them is bounded.
     shape : tuple of int
     progress : Progress
+    count : int
+        How many fields there are, for the progress.
 
     Raises
     ------
     ModelError
         As `split_maps`.
     """
-    maps = split_maps(sets, shape)
+    covariance = ShapeCovariance()
 
-    def dense() -> Iterator[NDArray[np.float64]]:
-        for done, (field, windows) in enumerate(zip(fields, sets, strict=True), start=1):
+    def windows_of_each() -> Iterator[MapSet]:
+        for done, (field, windows) in enumerate(fields, start=1):
+            yield windows
             west = field.west_of(float(windows.west[windows.column >= _first_held(windows)].min()))
-            yield ground_windows(west, *maps.window_m, shape, per_side=_DENSE_PER_SIDE).maps
-            progress("learning the covariance", done, len(fields))
+            covariance.add(ground_windows(west, *windows.window_m, shape, per_side=_DENSE_PER_SIDE).maps)
+            progress("learning the covariance", done, count)
 
-    return replace(maps, shapes=shape_covariance(dense()))
+    maps = split_maps(windows_of_each(), shape)
+    # Without any contrast the training maps have none either, and what is learned from them says so.
+    return replace(maps, shapes=covariance.value() if covariance.known else None)
 
 
-def split_maps(sets: Sequence[MapSet], shape: tuple[int, int]) -> TrainingMaps:
+def split_maps(sets: Iterable[MapSet], shape: tuple[int, int]) -> TrainingMaps:
     """Split the windows of fields by window column, so that validation windows overlap no training window.
 
-    The eastmost columns, about 15 %, are for validation; the three columns between are left out.
+    The eastmost columns, about 15 %, are for validation; the three columns between are left out. Of more than
+    `MOST_TRAINING` training windows as many are kept, chosen evenly.
 
     Raises
     ------
     ModelError
         When the fields differ in unit, or hold too few windows.
     """
-    units = sorted({maps.unit for maps in sets})
-    if len(units) != 1:
-        raise ModelError(f"the fields differ in unit ({', '.join(map(repr, units))}); learn from fields of one unit")
-    sizes = sorted({maps.window_m for maps in sets})
-    if len(sizes) != 1:
-        raise ModelError(f"windows of different sizes, {sizes} m, do not go together; cut all of one size")
-    training, validation = [], []
+    cells = shape[0] * shape[1]
+    training, validation = Reservoir(MOST_TRAINING, cells, 0), Reservoir(_MOST_HELD, cells, 1)
+    units: set[str] = set()
+    sizes: set[tuple[float, float]] = set()
+    sources = []
+    low, high = np.inf, -np.inf
     for maps in sets:
+        units.add(maps.unit)
+        sizes.add(maps.window_m)
+        _check_alike(units, sizes)
         first = _first_held(maps)
-        validation.append(maps.maps[maps.column >= first])
-        training.append(maps.maps[maps.column < first - _OVERLAP_COLUMNS])
-    held_out, learned_from = np.concatenate(validation), np.concatenate(training)
-    if len(learned_from) < _FEWEST_MAPS or not len(held_out):
+        validation.add(maps.maps[maps.column >= first])
+        learned_from = maps.maps[maps.column < first - _OVERLAP_COLUMNS]
+        training.add(learned_from)
+        low, high = learned_from.min(initial=low), learned_from.max(initial=high)
+        sources.append(maps.source)
+    ((unit,), (window_m,)) = units, sizes
+    if training.seen < _FEWEST_MAPS or not validation.seen:
         raise ModelError(
-            f"the field holds {len(learned_from)} training and {len(held_out)} validation windows of "
-            f"{sets[0].window_m[0] / 1000:.3g} x {sets[0].window_m[1] / 1000:.3g} km; at least "
+            f"the field holds {training.seen} training and {validation.seen} validation windows of "
+            f"{window_m[0] / 1000:.3g} x {window_m[1] / 1000:.3g} km; at least "
             f"{_FEWEST_MAPS} and 1 are needed: take a larger or finer field, several fields, or a smaller box"
         )
+    held_out = validation.maps
     spread = np.linspace(0, len(held_out) - 1, min(_MOST_VALIDATION, len(held_out))).round().astype(int)
-    source = "; ".join(maps.source for maps in sets)
-    return TrainingMaps(learned_from, held_out[spread], shape, sets[0].window_m, units[0], source)
+    parts = TrainingMaps(training.maps, held_out[spread], shape, window_m, unit, "; ".join(sources))
+    if training.seen == len(training.maps):
+        return parts
+    return replace(parts, extremes=(float(low), float(high)), windows=training.seen)
+
+
+def _check_alike(units: set[str], sizes: set[tuple[float, float]]) -> None:
+    if len(units) != 1:
+        named = ", ".join(map(repr, sorted(units)))
+        raise ModelError(f"the fields differ in unit ({named}); learn from fields of one unit")
+    if len(sizes) != 1:
+        raise ModelError(f"windows of different sizes, {sorted(sizes)} m, do not go together; cut all of one size")
 
 
 def _first_held(maps: MapSet) -> int:
@@ -174,7 +209,7 @@ def untuned_model(
     ModelError
         When the maps have no contrast, or the number of atoms is out of range.
     """
-    low, high = float(maps.training.min()), float(maps.training.max())
+    low, high = maps.span
     training, validation = ((part - low) / (high - low) for part in (maps.training, maps.validation))
     if not (np.ptp(validation, axis=1) > 0).any():
         raise ModelError(f"{maps.source}: the validation windows have no contrast: nothing can be judged on them")
@@ -195,6 +230,8 @@ def untuned_model(
         "validation_maps": str(len(validation)),
         "seed": str(seed),
     }
+    if maps.windows is not None:
+        about["training_windows"] = str(maps.windows)
     return Model(
         shape=maps.shape,
         dictionary=psi,

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sparsor.errors import FieldError
 from sparsor.prior.field import check_pixel_count, field_on_axes
+from sparsor.prior.raster import LAZY_PIXELS, TILE, OnFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     import xarray as xr
+    from numpy.typing import NDArray
 
     from sparsor.prior.field import Field
 
@@ -47,7 +50,9 @@ AXES = {
 LISTED = 12
 
 
-def read_netcdf(path: Path, *, variable: str | None = None, time: str | int | None = None) -> Field:
+def read_netcdf(
+    path: Path, *, variable: str | None = None, time: str | int | None = None, lazily: bool = False
+) -> Field:
     """Return one variable at one time step as a field.
 
     Parameters
@@ -59,6 +64,8 @@ def read_netcdf(path: Path, *, variable: str | None = None, time: str | int | No
     time : str or int, optional
         Index of the step from 0 (negative from the end), or the beginning of its ISO date, four digits or
         more, that fits one step; needed where there are several.
+    lazily : bool
+        Leave a large raster on file until windows are cut from it.
 
     Returns
     -------
@@ -71,7 +78,8 @@ def read_netcdf(path: Path, *, variable: str | None = None, time: str | int | No
         When it cannot be read, the variable or step is not there or not the only one, or the variable is not
         on a regular longitude-latitude raster.
     """
-    with _opened(path) as dataset:
+    with ExitStack() as closing:
+        dataset = closing.enter_context(_opened(path))
         name = _choose_variable(dataset, variable, path)
         array = dataset[name]
         lat_name, lon_name = (_axis(dataset, array, kind) for kind in AXES)
@@ -83,13 +91,40 @@ def read_netcdf(path: Path, *, variable: str | None = None, time: str | int | No
                 f"ncks -d {max(extra, key=lambda dim: extra[dim])},0"
             )
         array = array.squeeze(list(extra), drop=True).transpose(lat_name, lon_name)
-        check_pixel_count(array.shape[0], array.shape[1], str(path))
+        read, shape = partial(_values, array, path), (int(array.shape[0]), int(array.shape[1]))
+        values: NDArray[np.float64] | OnFile
+        if lazily and array.size > LAZY_PIXELS:
+            closing.pop_all()  # it stays open as long as the field is there
+            chunks = dict(zip(dataset[name].dims, dataset[name].encoding.get("chunksizes") or (), strict=False))
+            values = OnFile(shape, read, (int(chunks.get(lat_name, TILE)), int(chunks.get(lon_name, TILE))))
+        else:
+            check_pixel_count(*shape, str(path))
+            values = read(slice(0, shape[0]), slice(0, shape[1]))
         with _wrapped(path):
-            values = np.asarray(array.values, dtype=np.float64)
             lon_deg, lat_deg = (np.asarray(dataset[axis].values, float) for axis in (lon_name, lat_name))
     unit = str(array.attrs.get("units", "")).strip()
     source = ", ".join(part for part in (f"{path}: {name}", step) if part)
     return field_on_axes(values, lon_deg, lat_deg, unit=unit, source=source)
+
+
+def time_steps(path: Path, variable: str | None = None) -> int | None:
+    """Return how many time steps `read_netcdf` offers of a variable; None where there is no time.
+
+    Raises
+    ------
+    FieldError
+        As `read_netcdf`.
+    """
+    with _opened(path) as dataset:
+        array = dataset[_choose_variable(dataset, variable, path)]
+        keep = [_axis(dataset, array, kind) for kind in AXES]
+        times = [size for dim, size in array.sizes.items() if str(dim) not in keep and _is_time(array, str(dim))]
+    return times[0] if times else None
+
+
+def _values(array: xr.DataArray, path: Path, rows: slice, columns: slice) -> NDArray[np.float64]:
+    with _wrapped(path):
+        return np.asarray(array[rows, columns].values, dtype=np.float64)
 
 
 @contextmanager
@@ -223,6 +258,8 @@ def _step_texts(array: xr.DataArray, dim: str) -> list[str]:
 
 
 def _step_index(steps: list[str], time: str | int | None, source: str) -> int:
+    if isinstance(time, int) and 0 <= time < len(steps):
+        return time  # as text it may be taken for a year
     there = f"its {len(steps)} steps are: {_list(steps)}"
     if time is None:
         if len(steps) == 1:

@@ -27,6 +27,7 @@ def read_field(
     box: tuple[float, float, float, float] | None = None,
     colormap: str | None = None,
     value_range: tuple[float, float] | None = None,
+    lazily: bool = False,
 ) -> Field:
     """Return the field in a file; what kind of file it is, its first bytes say.
 
@@ -44,6 +45,8 @@ def read_field(
         Picture: name of the matplotlib colour map it was rendered with; may be left out for a grey one.
     value_range : tuple of float, optional
         Picture: values of the first and the last colour; 0 and 1 when left out.
+    lazily : bool
+        Leave a large raster on file until windows are cut from it, so that it may be larger than memory.
 
     Returns
     -------
@@ -61,7 +64,7 @@ def read_field(
         from sparsor.prior.netcdf import read_netcdf
 
         _refuse(file, "NetCDF file", {BOX: box, COLORMAP: colormap, RANGE: value_range})
-        return read_netcdf(file, variable=variable, time=time)
+        return read_netcdf(file, variable=variable, time=time, lazily=lazily)
     # A TIFF may be either: a colour map or a range says that it is a picture.
     if kind == "picture" or colormap is not None or value_range is not None:
         from sparsor.prior.heatmap import read_heatmap
@@ -74,7 +77,18 @@ def read_field(
     from sparsor.prior.geotiff import read_geotiff
 
     _refuse(file, "raster", {TIME: time})
-    return read_geotiff(file, variable=variable, box=box)
+    return read_geotiff(file, variable=variable, box=box, lazily=lazily)
+
+
+def is_netcdf(path: Path) -> bool:
+    """Return whether a file is NetCDF, by its first bytes.
+
+    Raises
+    ------
+    FieldError
+        When there is no such file.
+    """
+    return _kind_of(path) == "netcdf"
 
 
 def _kind_of(file: Path) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from sparsor.errors import FieldError
 from sparsor.geodesy.box import MAX_LATITUDE_DEG
 from sparsor.prior.field import check_pixel_count, field_on_axes
+from sparsor.prior.raster import OnFile
 from sparsor.prior.resampling import bilinear_at
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ POINTS_AT_ONCE = 1_000_000
 class Band:
     """One band as it is in the file: values with NaN gaps, its CRS, and pixel (column, row) -> CRS."""
 
-    values: NDArray[np.float64]
+    values: NDArray[np.float64] | OnFile
     crs: CRS
     transform: Affine
     unit: str
@@ -57,6 +58,7 @@ def reprojected(band: Band, path: Path) -> Field:
     FieldError
         When the CRS has no way to longitude and latitude there, or the field would be too large.
     """
+    assert not isinstance(band.values, OnFile), "each pixel takes its value from anywhere in the file"
     lon_deg, lat_deg = _target(band, path)
     check_pixel_count(lat_deg.size, lon_deg.size, band.source)
     values = np.empty((lat_deg.size, lon_deg.size))

@@ -62,7 +62,16 @@ def sample_at(field: Field, lon_deg: ArrayLike, lat_deg: ArrayLike) -> NDArray[n
     # A hair before the western edge, so that points on that edge stay inside whatever turn they came by.
     column = ((lon - west + 1e-9) % 360.0 - 1e-9) / width - 0.5
     row = (field.lat_deg[0] - lat) / height
-    return bilinear_at(field.values, row, column)
+    if isinstance(field.values, np.ndarray):
+        return bilinear_at(field.values, row, column)
+    around = [_around(place, size) for place, size in zip((row, column), field.values.shape, strict=True)]
+    return bilinear_at(field.values[around[0], around[1]], row - around[0].start, column - around[1].start)
+
+
+def _around(place: NDArray[np.float64], size: int) -> slice:
+    """Return the pixels of an axis that places lie between."""
+    first = int(np.clip(np.floor(place.min()), 0, size - 1))
+    return slice(first, int(np.clip(np.ceil(place.max()) + 1, first + 1, size)))
 
 
 def bilinear_at(

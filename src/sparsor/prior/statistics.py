@@ -66,8 +66,43 @@ def unit_shapes(maps: NDArray[np.float64], allowed: NDArray[np.bool_] | None = N
     return np.asarray(shifted / inside[contrast].std(axis=1, keepdims=True))
 
 
+class ShapeCovariance:
+    """The mean of ``x x^T`` over the shapes x of maps that come set by set: none has to be kept.
+
+    Each map counts as much as its spread. That is between maps as they are, of which a few strong ones decide all, and
+    bare shapes, of which the many weak ones do; see docs/decisions/0012-refined-search.md.
+    """
+
+    def __init__(self) -> None:
+        self._weight = 0.0
+        self._total: NDArray[np.float64] | float = 0.0
+
+    def add(self, maps: NDArray[np.float64]) -> None:
+        """Count maps in, (n, N)."""
+        shapes, spread = unit_shapes(maps), maps[np.ptp(maps, axis=1) > 0].std(axis=1)
+        self._total = self._total + (shapes * spread[:, None]).T @ shapes
+        self._weight += float(spread.sum())
+
+    @property
+    def known(self) -> bool:
+        """Whether a map with contrast was among them."""
+        return self._weight > 0
+
+    def value(self) -> NDArray[np.float64]:
+        """Return the covariance of the maps so far, (N, N).
+
+        Raises
+        ------
+        ModelError
+            When not one map has contrast.
+        """
+        if not self.known:
+            raise ModelError("the training maps have no contrast: there is no covariance to learn")
+        return np.asarray(self._total / self._weight)
+
+
 def shape_covariance(sets: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the mean of ``x x^T`` over the shapes x of maps, (N, N): a covariance free of level and amplitude.
+    """Return the mean of ``x x^T`` over the shapes x of maps, (N, N), see `ShapeCovariance`.
 
     Parameters
     ----------
@@ -79,15 +114,10 @@ def shape_covariance(sets: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]
     ModelError
         When not one map has contrast.
     """
-    total: NDArray[np.float64] | float = 0.0
-    count = 0
+    covariance = ShapeCovariance()
     for maps in sets:
-        shapes = unit_shapes(maps)
-        total = total + shapes.T @ shapes
-        count += len(shapes)
-    if not count:
-        raise ModelError("the training maps have no contrast: there is no covariance to learn")
-    return np.asarray(total / count)
+        covariance.add(maps)
+    return covariance.value()
 
 
 def covariance_factor(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

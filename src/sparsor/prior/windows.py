@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.errors import FieldError
+from sparsor.errors import EmptyFieldError, FieldError
 from sparsor.prior.lattice import EDGE, extent_m, lay_windows, resolved_scale
 from sparsor.prior.resampling import cell_means, fill_gaps
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.prior.field import Field
+    from sparsor.prior.raster import LazyRaster
 
 MAX_GAP_FRACTION = 0.05
 LEAST_WINDOWS = 12
@@ -76,7 +77,7 @@ class MapSet:
                 "this field out"
             )
         if len(self.maps) == 0:
-            raise FieldError(
+            raise EmptyFieldError(
                 f"{self.source}: no window without large gaps: {self.dropped} had more than "
                 f"{MAX_GAP_FRACTION:.0%} of their pixels missing; give a field with fewer gaps"
             )
@@ -231,7 +232,7 @@ def nearest_resolved_m(
 
 
 def _cut(
-    values: NDArray[np.float64],
+    values: NDArray[np.float64] | LazyRaster,
     frames: Iterable[tuple[int, int, tuple[float, float, float, float]]],
     shape: tuple[int, int],
     *,

@@ -105,7 +105,7 @@ def dense_maps(
 
 
 def _pixels(field: Field, pixels: tuple[int, int] | None) -> NDArray[np.float64]:
-    return field.values if pixels is None else resample_bilinear(field.values, pixels)
+    return field.in_memory if pixels is None else resample_bilinear(field.in_memory, pixels)
 
 
 def random_split(maps: MapSet, seed: int) -> Split:

@@ -111,7 +111,7 @@ def field_truth(field: Field, over: Box | None = None) -> RasterTruth:
     west, south, east, north = over or field.edges_deg
     source = f"{field.source}, laid over another box" if over else field.source
     box = (west, south, east + 360.0 if east < west else east, north)
-    return RasterTruth(_stretched(fill_gaps(field.values), field.source), box, source)
+    return RasterTruth(_stretched(fill_gaps(field.in_memory), field.source), box, source)
 
 
 def truth_netcdf(truth: RasterTruth, low_ppb: float, high_ppb: float) -> bytes:
