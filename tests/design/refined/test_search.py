@@ -73,6 +73,38 @@ def test_crossing_legs_are_seen_and_clear_ones_are_not():
     assert not crosses(np.array([0, 2, 26, 24]), LEGS.length, 12, 0, 3)
 
 
+def blown(wind):
+    """Legs in seconds with a wind from the west, as a share of the speed through the air."""
+    column = np.arange(LEGS.size) % SHAPE[1]
+    east = column - column[:, None]
+    # Ground speed along a leg that is held against the wind (the triangle of velocities).
+    along = np.divide(east, LEGS.length, out=np.zeros_like(LEGS.length), where=LEGS.length > 0) * wind
+    across = wind**2 - along**2
+    return replace(LEGS, seconds=LEGS.length / (along + np.sqrt(1 - across)))
+
+
+def test_with_wind_no_crossing_is_left_that_turning_a_stretch_round_would_shorten():
+    legs = blown(0.5)
+    budget = Budget(70.0, "time", home=np.zeros(LEGS.size))
+    route = refine(task(legs, budget), seed=3, iterations=4000)
+    stops = route.stops
+    assert route.used == pytest.approx(legs.path_seconds(stops))
+    assert route.used <= 70.0
+    row, column = np.divmod(stops, SHAPE[1])
+    lines = [shapely.LineString(pair) for pair in pairwise(np.stack([column, row], axis=1))]
+    for a, b in combinations(range(len(lines)), 2):
+        if b > a + 1 and lines[a].intersects(lines[b]):
+            turned = np.concatenate([stops[: a + 1], stops[a + 1 : b + 1][::-1], stops[b + 1 :]])
+            assert legs.path_seconds(turned) >= legs.path_seconds(stops) * (1 - 1e-9)
+
+
+def test_wind_makes_a_route_and_its_way_back_cost_different():
+    legs = blown(0.5)
+    there = np.array([0, 11])
+    assert legs.path_seconds(there) == pytest.approx(11 / 1.5)
+    assert used(costs(Budget(99.0, "time", home=np.zeros(LEGS.size)), legs), there[::-1]) == pytest.approx(22.0)
+
+
 def test_the_route_stays_on_allowed_cells():
     allowed = ALL.reshape(SHAPE).copy()
     allowed[3:8, 4:9] = False

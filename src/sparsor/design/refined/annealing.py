@@ -67,7 +67,7 @@ def anneal(
         trial = propose(stops, prior.allowed, over.columns, over.hold_s > 0, rng)
         if trial.size < 2 or used(costs, trial) > costs.limit:
             continue
-        head, tail = _unchanged(stops, trial)
+        head, tail = _unchanged(stops, trial) if costs.symmetric else (0, 0)
         if crosses(trial, costs.legs, over.columns, head, trial.size - 1 - tail):
             continue
         cell, seconds = passes(over, trial)

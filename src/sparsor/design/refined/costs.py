@@ -19,12 +19,14 @@ class Costs(NamedTuple):
     Parameters
     ----------
     legs : array of float64 (N, N)
-        Metres, cell widths or seconds; symmetric. On the diagonal: one dwell.
+        Metres, cell widths or seconds, from row to column. On the diagonal: one dwell.
     ends : array of float64 (N,)
         The way between home and each cell.
     closing : float
         1 when the way from the last stop to the first counts, 0 otherwise.
     per_stop, fixed, limit : float
+    symmetric : bool
+        Whether every leg costs the same both ways: with wind it does not.
     """
 
     legs: NDArray[np.float64]
@@ -33,6 +35,7 @@ class Costs(NamedTuple):
     per_stop: float
     fixed: float
     limit: float
+    symmetric: bool
 
 
 def costs(budget: Budget, legs: LegTable, dwell_s: float = 0.0) -> Costs:
@@ -46,7 +49,13 @@ def costs(budget: Budget, legs: LegTable, dwell_s: float = 0.0) -> Costs:
     np.fill_diagonal(table, dwell_s * (legs.length.sum() / legs.seconds.sum() if distance else 1.0))
     ends = np.zeros(legs.size) if distance or budget.home is None else np.ascontiguousarray(budget.home)
     closing = float(not distance and budget.home is None)
-    return Costs(table, ends, closing, float(budget.per_stop), float(budget.fixed), float(budget.limit))
+    symmetric = bool(np.array_equal(table, table.T))
+    return Costs(table, ends, closing, float(budget.per_stop), float(budget.fixed), float(budget.limit), symmetric)
+
+
+def both_ways(costs: Costs) -> NDArray[np.float64]:
+    """Return what each leg costs on average there and back: tours are sought as if there were no wind."""
+    return costs.legs if costs.symmetric else (costs.legs + costs.legs.T) / 2
 
 
 @njit(cache=True, nogil=True)

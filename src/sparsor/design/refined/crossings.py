@@ -24,25 +24,34 @@ def crosses(stops: NDArray[np.int64], length: NDArray[np.float64], columns: int,
     ----------
     stops : array of int64 (n,)
     length : array of float64 (N, N)
-        Symmetric costs of the legs.
+        Costs of the legs.
     columns : int
         Of the grid.
     first, last : int
         Legs outside this stretch are taken to be clear of one another.
     """
     for i in range(first, last):
-        a, b = stops[i], stops[i + 1]
         for j in range(stops.size - 1):
             if first <= j < i + 2 or abs(j - i) < 2:
                 continue
-            c, d = stops[j], stops[j + 1]
-            if not _meet(a, b, c, d, columns):
+            a, b = min(i, j), max(i, j)
+            if not _meet(stops[a], stops[a + 1], stops[b], stops[b + 1], columns):
                 continue
-            before = length[a, b] + length[c, d]
-            after = length[a, c] + length[b, d]  # the same whichever leg comes first: the table is symmetric
+            before, after = _reconnected(stops, length, a, b)
             if before - after > _LEAST_GAIN * before:
                 return True
     return False
+
+
+@njit(cache=True, nogil=True)
+def _reconnected(stops: NDArray[np.int64], length: NDArray[np.float64], a: int, b: int) -> tuple[float, float]:
+    """Return what the legs from position a to b + 1 cost, and what they do with the stretch between turned round."""
+    before = length[stops[a], stops[a + 1]] + length[stops[b], stops[b + 1]]
+    after = length[stops[a], stops[b]] + length[stops[a + 1], stops[b + 1]]
+    for k in range(a + 1, b):  # the same both ways, but for wind
+        before += length[stops[k], stops[k + 1]]
+        after += length[stops[k + 1], stops[k]]
+    return before, after
 
 
 @njit(cache=True, nogil=True)

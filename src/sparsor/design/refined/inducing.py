@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.design.refined.costs import used
+from sparsor.design.refined.costs import both_ways, used
 from sparsor.design.route import shortest_path
 
 if TYPE_CHECKING:
@@ -42,10 +42,11 @@ def inducing_tour(
         Cells to begin from, the most telling first; about as many as fit.
     """
     fits: NDArray[np.int64] | None = None
+    legs = both_ways(costs)
     count = min(begin.size, max(2, _within(begin, costs)))
     for _ in range(_TRIES):
         cells = placed(prior, shape, noise, begin[:count])
-        tour = shortest_path(cells, costs.legs) if cells.size > 1 else cells
+        tour = shortest_path(cells, legs) if cells.size > 1 else cells
         if tour.size > 1 and used(costs, tour) <= costs.limit:
             if fits is None or tour.size > fits.size:
                 fits = tour
@@ -113,10 +114,10 @@ def _between(
 
 def _within(ranking: NDArray[np.int64], costs: Costs) -> int:
     """Return about how many of the first cells of a ranking a tour within the budget joins."""
-    low, high = 2, ranking.size
+    low, high, legs = 2, ranking.size, both_ways(costs)
     while low < high:
         middle = (low + high + 1) // 2
-        if used(costs, shortest_path(ranking[:middle], costs.legs)) <= costs.limit:
+        if used(costs, shortest_path(ranking[:middle], legs)) <= costs.limit:
             low = middle
         else:
             high = middle - 1

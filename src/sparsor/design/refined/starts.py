@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sparsor.design.refined.costs import used
+from sparsor.design.refined.costs import both_ways, used
 from sparsor.design.refined.inducing import inducing_tour
 from sparsor.design.route import shortest_path
 
@@ -62,9 +62,9 @@ def most_telling(prior: Belief, noise: float) -> NDArray[np.int64]:
 
 def tour_within(ranking: NDArray[np.int64], costs: Costs) -> NDArray[np.int64] | None:
     """Return the tour of as many of the first cells of a ranking as the budget allows; None when not of two."""
-    fits, count = None, 2
+    fits, count, legs = None, 2, both_ways(costs)
     while count <= ranking.size:
-        tour = shortest_path(ranking[:count], costs.legs)
+        tour = shortest_path(ranking[:count], legs)
         if used(costs, tour) > costs.limit:
             break
         fits, count = tour, count + 1
