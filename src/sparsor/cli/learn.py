@@ -71,7 +71,7 @@ def learn(
 
     sparsor learn no2.tif -o no2.npz --window 400 400
     """
-    from sparsor.core.cluster import workers_at
+    from sparsor.core.schedulers import workers_at
     from sparsor.journeys.learning import LearnRequest, learn_from_fields
 
     talk = Talk.of(quiet=quiet, verbose=verbose)

@@ -256,7 +256,7 @@ def plan(
         "output": {"export": _formats(export)},
     }
     spec, folder = _request(given, mission_file, output)
-    from sparsor.core.cluster import workers_at
+    from sparsor.core.schedulers import workers_at
     from sparsor.journeys.advice import advice
     from sparsor.journeys.folder import check_folder, write_mission
     from sparsor.journeys.planning import plan_mission
