@@ -18,8 +18,8 @@ import time
 
 import psutil
 
-from sparsor.core.cluster import workers_at
 from sparsor.core.progress import silent
+from sparsor.core.schedulers import workers_at
 from sparsor.core.workers import Threads
 from sparsor.design import Budget, Problem, Weights, search, searched_sparsity, unit_legs
 from sparsor.design.decoders.covariance import training_covariance

@@ -49,6 +49,31 @@ def test_learn_tells_what_it_did(console, smooth_field):
     assert Path("words.npz").read_bytes() == Path("m.npz").read_bytes()
 
 
+def test_all_months_of_an_archive_are_learned_from_and_planned_with(console, smooth_field):
+    import rasterio
+    import xarray as xr
+
+    with rasterio.open(smooth_field) as dataset:
+        values = dataset.read(1)[::-1].astype(float)
+    axes = {
+        "time": np.datetime64("2020-01-01", "ns") + np.arange(3) * np.timedelta64(31, "D"),
+        "lat": ("lat", 25.13 + 0.01 * np.arange(88), {"units": "degrees_north"}),
+        "lon": ("lon", 51.0 + 0.01 * np.arange(88), {"units": "degrees_east"}),
+    }
+    months = np.stack([values, values[::-1], np.full_like(values, np.nan)])
+    xr.Dataset({"no2": (("time", "lat", "lon"), months, {"units": "ppb"})}, coords=axes).to_netcdf("months.nc")
+
+    one = learned(console, "months.nc", "--dictionary", "dct", "--atoms", 20, "--field-time", "2020-01")
+    every = learned(console, "months.nc", "--dictionary", "dct", "--atoms", 20, "--field-time", "all")
+    assert every["maps"] == 2 * one["maps"]
+    assert "1 time steps were left out" in every["warnings"][0]
+    assert read_model(Path("m.npz")).provenance["source"].startswith("months.nc: no2, 3 time steps, sha256 ")
+    options = ("--field", "months.nc", "--field-time", "all", "--atoms", 10, "--name", "months", "--json")
+    ran = console.mission(*options, box=console.FIELD_BOX)
+    assert ran.code == 0, ran.err
+    assert "months.nc: no2, 3 time steps" in read_sidecar(Path("missions/months/months.npz")).model.provenance["source"]
+
+
 def test_gaps_are_counted(console, smooth_field, geotiff):
     import rasterio
 

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from sparsor.core.cluster import Cluster, workers_at
+from sparsor.core.cluster import Cluster
+from sparsor.core.schedulers import workers_at
 from sparsor.errors import SchedulerError, WorkersLostError
 
 
@@ -138,7 +139,7 @@ def test_a_number_of_workers_is_for_those_of_our_own():
 
 
 def test_other_versions_are_refused(two, monkeypatch):
-    monkeypatch.setattr("sparsor.core.cluster._here", lambda name: "0.0.1" if name == "Python" else version(name))
+    monkeypatch.setattr("sparsor.core.schedulers._here", lambda name: "0.0.1" if name == "Python" else version(name))
     with (
         pytest.raises(SchedulerError, match=r"runs Python .*, here it is 0\.0\.1"),
         workers_at(two._client.scheduler.address),

@@ -11,7 +11,7 @@ import pytest
 import rasterio
 from rasterio.transform import from_origin
 
-from sparsor.core.cluster import workers_at
+from sparsor.core.schedulers import workers_at
 from sparsor.journeys.folder import write_mission
 from sparsor.journeys.learning import LearnRequest, learn_from_fields
 from sparsor.journeys.planning import plan_mission

@@ -23,7 +23,10 @@ from sparsor.cli.console import (
 
 @reporting
 def learn(
-    fields: Annotated[list[Path], typer.Argument(metavar="FIELD...", help="GeoTIFF, NetCDF or heatmap pictures.")],
+    fields: Annotated[
+        list[Path],
+        typer.Argument(metavar="FIELD...", help="GeoTIFF, NetCDF, Zarr or heatmap pictures, of any number and size."),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="MODEL.npz", help="The model's file.")],
     window: Annotated[
         tuple[float, float] | None,
@@ -40,7 +43,7 @@ def learn(
     ] = None,
     variable: Annotated[str | None, typer.Option("--variable", help="NetCDF variable, or GeoTIFF band.")] = None,
     field_time: Annotated[
-        str | None, typer.Option("--field-time", help="NetCDF time step: index or beginning of its date.")
+        str | None, typer.Option("--field-time", help="NetCDF time step: index, beginning of its date, or all.")
     ] = None,
     field_bbox: Annotated[
         tuple[float, float, float, float] | None,
@@ -68,7 +71,7 @@ def learn(
 
     sparsor learn no2.tif -o no2.npz --window 400 400
     """
-    from sparsor.core.cluster import workers_at
+    from sparsor.core.schedulers import workers_at
     from sparsor.journeys.learning import LearnRequest, learn_from_fields
 
     talk = Talk.of(quiet=quiet, verbose=verbose)

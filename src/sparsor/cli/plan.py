@@ -73,7 +73,7 @@ def plan(
         Path | None,
         _option(
             PRIOR,
-            "Learn from this field: GeoTIFF, NetCDF or a heatmap picture (default: the built-in synthetic field).",
+            "Learn from this field: GeoTIFF, NetCDF, Zarr, a heatmap picture (default: the built-in synthetic field).",
             "--field",
             metavar="FILE",
         ),
@@ -81,7 +81,7 @@ def plan(
     variable: Annotated[str | None, _option(PRIOR, "NetCDF variable, or GeoTIFF band.", "--variable")] = None,
     field_time: Annotated[
         str | None,
-        _option(PRIOR, "NetCDF time step: its index or the beginning of its date.", "--field-time"),
+        _option(PRIOR, "NetCDF time step: its index, the beginning of its date, or all.", "--field-time"),
     ] = None,
     field_bbox: Annotated[
         Box | None, _option(PRIOR, "Where a picture lies.", "--field-bbox", metavar="W S E N")
@@ -267,7 +267,7 @@ def plan(
         "output": {"export": _formats(export)},
     }
     spec, folder = _request(given, mission_file, output)
-    from sparsor.core.cluster import workers_at
+    from sparsor.core.schedulers import workers_at
     from sparsor.journeys.advice import advice
     from sparsor.journeys.folder import check_folder, write_mission
     from sparsor.journeys.pareto import curve_files, curve_rows, plan_with_curve

@@ -204,7 +204,7 @@ def search(
 
     def handed_out() -> Iterator[_Samples]:
         first, end, size = 0, iterations if seconds is None else sys.maxsize, _BLOCK * hands.grain
-        while first < end and (seconds is None or time.monotonic() - begun < seconds):
+        while first < end and (first == 0 or seconds is None or time.monotonic() - begun < seconds):
             last = min(first + size, end)
             yield _Samples(first, last, best.ceiling())
             first = last

@@ -89,8 +89,8 @@ def learn_from_fields(
     request : LearnRequest
     output : Path
     workers : Workers or int, optional
-        Who learns, see `sparsor.core.cluster.workers_at`; a number is one of threads, one a core by default. The model
-        is the same for any.
+        Who learns, see `sparsor.core.schedulers.workers_at`; a number is one of threads, one a core by default. The
+        model is the same for any.
     progress : Progress
 
     Raises

@@ -102,7 +102,7 @@ def plan_mission(
     ----------
     spec : MissionSpecification
     workers : Workers or int, optional
-        Who searches and learns, see `sparsor.core.cluster.workers_at`; a number is one of threads, one a core by
+        Who searches and learns, see `sparsor.core.schedulers.workers_at`; a number is one of threads, one a core by
         default. The answer is the same for any.
     progress : Progress
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from sparsor.prior.field import Field
 
+# GDAL's own would keep a twentieth of the machine's memory; the tiles read last are kept by us.
+GDAL_CACHE_MB = 32
 PLACE_IT = "place it with --field-bbox W S E N, or write its CRS into it, e.g. with gdal_edit.py -a_srs EPSG:4326"
 
 
@@ -120,7 +122,7 @@ def _gdal_errors(path: Path) -> Iterator[None]:
 def _read_band(path: Path, variable: str | None, *, placed: bool, lazily: bool = False) -> Band:
     import rasterio
 
-    with _gdal_errors(path), ExitStack() as closing:
+    with _gdal_errors(path), rasterio.Env(GDAL_CACHEMAX=GDAL_CACHE_MB), ExitStack() as closing:
         dataset = closing.enter_context(rasterio.open(path))
         if not placed:
             _check_georeferenced(dataset, path)
@@ -140,7 +142,9 @@ def _read_band(path: Path, variable: str | None, *, placed: bool, lazily: bool =
 
 def _values(dataset: DatasetReader, number: int, path: Path, rows: slice, columns: slice) -> NDArray[np.float64]:
     """Return a part of a band; gaps are NaN."""
-    with _gdal_errors(path):
+    import rasterio
+
+    with _gdal_errors(path), rasterio.Env(GDAL_CACHEMAX=GDAL_CACHE_MB):
         masked = dataset.read(number, masked=True, window=((rows.start, rows.stop), (columns.start, columns.stop)))
     if masked.dtype.kind not in "iuf":
         raise FieldError(f"{path}: band {number} holds {masked.dtype} values; real numbers are needed")

@@ -1,4 +1,4 @@
-"""Fields from NetCDF files that follow the CF conventions."""
+"""Fields from NetCDF files and Zarr folders that follow the CF conventions."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def read_netcdf(
     Parameters
     ----------
     path : Path
-        NetCDF 4 (HDF5) or classic NetCDF 3.
+        NetCDF 4 (HDF5), classic NetCDF 3, or a folder of Zarr.
     variable : str, optional
         Needed where there is more than one variable over latitude and longitude.
     time : str or int, optional
@@ -95,7 +95,7 @@ def read_netcdf(
         values: NDArray[np.float64] | OnFile
         if lazily and array.size > LAZY_PIXELS:
             closing.pop_all()  # it stays open as long as the field is there
-            chunks = dict(zip(dataset[name].dims, dataset[name].encoding.get("chunksizes") or (), strict=False))
+            chunks = dict(zip(dataset[name].dims, _chunks(dataset[name]), strict=False))
             values = OnFile(shape, read, (int(chunks.get(lat_name, TILE)), int(chunks.get(lon_name, TILE))))
         else:
             check_pixel_count(*shape, str(path))
@@ -127,6 +127,11 @@ def _values(array: xr.DataArray, path: Path, rows: slice, columns: slice) -> NDA
         return np.asarray(array[rows, columns].values, dtype=np.float64)
 
 
+def _chunks(array: xr.DataArray) -> tuple[int, ...]:
+    """Return the sizes of what is packed together, a number for each dimension, as NetCDF or Zarr say it."""
+    return tuple(array.encoding.get("chunksizes") or array.encoding.get("chunks") or ())
+
+
 @contextmanager
 def _wrapped(path: Path) -> Iterator[None]:
     try:
@@ -142,6 +147,12 @@ def _wrapped(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[xr.Dataset]:
+    if path.is_dir():
+        with _wrapped(path):
+            dataset = _open(path, "zarr")
+        with dataset:
+            yield dataset
+        return
     with path.open("rb") as stream:
         magic = stream.read(4)
     if magic == b"CDF\x05":

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
     from sparsor.prior.field import Field
 
-KINDS = "a GeoTIFF, a NetCDF file, or a heatmap picture (PNG, JPEG, WebP) with --field-bbox W S E N"
+KINDS = "a GeoTIFF, a NetCDF file or Zarr folder, or a heatmap picture (PNG, JPEG, WebP) with --field-bbox W S E N"
 VARIABLE, TIME, BOX = "--variable", "time step", "--field-bbox"
 COLORMAP, RANGE = "--field-colormap", "--field-range"
 NETCDF = (b"\x89HDF\r\n\x1a\n", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+ZARR = ("zarr.json", ".zmetadata", ".zgroup")
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"GIF8", b"BM")
 
 
@@ -34,7 +35,7 @@ def read_field(
     Parameters
     ----------
     path : path
-        A GeoTIFF or another raster with a CRS, NetCDF, or a picture.
+        A GeoTIFF or another raster with a CRS, NetCDF, Zarr, or a picture.
     variable : str, optional
         NetCDF: name of the variable. GeoTIFF: name or number, from 1, of the band.
     time : str or int, optional
@@ -81,7 +82,7 @@ def read_field(
 
 
 def is_netcdf(path: Path) -> bool:
-    """Return whether a file is NetCDF, by its first bytes.
+    """Return whether a file is NetCDF, by its first bytes, or a folder of Zarr, which follows the same conventions.
 
     Raises
     ------
@@ -93,6 +94,8 @@ def is_netcdf(path: Path) -> bool:
 
 def _kind_of(file: Path) -> str:
     if file.is_dir():
+        if any((file / name).is_file() for name in ZARR):
+            return "netcdf"
         raise FieldError(f"'{file}' is a folder; give a file: {KINDS}")
     try:
         with file.open("rb") as stream:
