@@ -8,140 +8,49 @@ stream, so that the answer does not depend on how many workers share the samples
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import count
-from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
-from sparsor.design.budget import Budget  # noqa: TC001
-from sparsor.design.candidate import reconstruction_error
-from sparsor.design.legs import LegTable  # noqa: TC001
-from sparsor.design.route import shortest_path
-from sparsor.design.sensing import draw_phi, incoherence, measured_atoms
+from sparsor.design.candidate import Best, Desk, try_sample
 from sparsor.errors import BudgetError, DesignError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from sparsor.design.problem import Candidate, Problem, Sparsity, Weights
 
 _BLOCK = 16  # samples handed to a worker at a time
 _SLICE = 256  # blocks that wait for a worker
-# Skipping has to be exact: a candidate is given up only when it is worse by more than rounding.
-_SLACK = 1.0 + 1e-9
-
-Sparsity = Callable[[np.random.Generator], tuple[float, int]]
 
 
 @dataclass(frozen=True)
-class Weights:
-    """The three weights of the cost C (the paper's Eq. 6)."""
-
-    valid: float = 1.0
-    path: float = 0.0
-    incoherence: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, value in (("valid", self.valid), ("path", self.path), ("incoh", self.incoherence)):
-            if not (np.isfinite(value) and value >= 0):
-                raise DesignError(f"lambda_{name} is {value:g}; it has to be 0 or above")
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What Algorithm 1 is given.
+class Found:
+    """What a range of samples came to.
 
     Parameters
     ----------
-    psi : array of float64 (N, K)
-        Dictionary.
-    maps : array of float64 (n, N)
-        Validation maps on the dictionary's scale, its mean taken off.
-    lasso_weight : float
-        lambda of the LASSO.
-    legs : LegTable
-    rows : int
-        M, rows of Phi.
-    budget : Budget, optional
-        Routes beyond it are rejected.
-    unit_rows, improve : bool
-        The default reading of mu and of the path; both False is the paper's.
+    candidate : Candidate, optional
+        The cheapest, at equal cost the one with the lowest number; None when none can win.
+    shortest : float
+        What the shortest route beyond the budget uses; infinite when there was none.
     """
 
-    psi: NDArray[np.float64]
-    maps: NDArray[np.float64]
-    lasso_weight: float
-    legs: LegTable
-    rows: int = 35
-    budget: Budget | None = None
-    unit_rows: bool = True
-    improve: bool = True
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.lasso_weight) and self.lasso_weight > 0):
-            raise DesignError(f"lasso weight is {self.lasso_weight:g}; it has to be above 0")
-        if not 1 <= self.rows <= self.legs.size:
-            raise DesignError(f"rows is {self.rows}; a measurement matrix has 1..{self.legs.size} rows")
-        if self.maps.shape[1] != self.legs.size or self.psi.shape[0] != self.legs.size:
-            raise DesignError(
-                f"maps of {self.maps.shape[1]} cells and atoms of {self.psi.shape[0]} do not fit a grid of "
-                f"{self.legs.size} cells"
-            )
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One Monte-Carlo sample that was evaluated to the end.
-
-    Parameters
-    ----------
-    sample : int
-        r, counted from 0.
-    cost, error, length_cells, incoherence : float
-        C, E (mean squared l2 error), L in cell units, mu.
-    phi : array of bool (M, N)
-    stops : array of int64 (n,)
-        The visited cells in path order.
-    probability, theta : float, int
-        What the sample was drawn with.
-    dwells : array of int64 (n,), optional
-        How many holds long the vehicle stays at each stop; None: one at every stop.
-    """
-
-    sample: int
-    cost: float
-    error: float
-    length_cells: float
-    incoherence: float
-    phi: NDArray[np.bool_]
-    stops: NDArray[np.int64]
-    probability: float
-    theta: int
-    dwells: NDArray[np.int64] | None = None
-
-
-@dataclass
-class _Best:
-    """The best candidate so far, shared by the workers."""
-
-    candidate: Candidate | None = None
+    candidate: Candidate | None
     shortest: float = np.inf
-    lock: Lock = field(default_factory=Lock)
 
-    def ceiling(self) -> float:
-        return np.inf if self.candidate is None else self.candidate.cost
-
-    def offer(self, candidate: Candidate) -> None:
-        with self.lock:
-            held = self.candidate
-            if held is None or (candidate.cost, candidate.sample) < (held.cost, held.sample):
-                self.candidate = candidate
-
-    def too_long(self, used: float) -> None:
-        with self.lock:
-            self.shortest = min(self.shortest, used)
+    def merged(self, other: Found) -> Found:
+        """Return what both ranges together came to, in whichever order they were searched."""
+        candidates = [one for one in (self.candidate, other.candidate) if one is not None]
+        winner = min(candidates, key=lambda one: (one.cost, one.sample), default=None)
+        return Found(winner, min(self.shortest, other.shortest))
 
 
 def search(
@@ -154,6 +63,7 @@ def search(
     seconds: float | None = None,
     workers: int = 1,
     progress: Progress = silent,
+    skip: bool = True,
 ) -> Candidate:
     """Run Algorithm 1.
 
@@ -171,6 +81,8 @@ def search(
     workers : int
         Threads; the compiled parts run side by side.
     progress : Progress
+    skip : bool
+        Whether candidates are given up once they cannot win; the answer is the same either way.
 
     Raises
     ------
@@ -181,37 +93,86 @@ def search(
     """
     if iterations < 1:
         raise DesignError(f"iterations is {iterations}; at least 1 is needed")
-    best = _Best()
+    if seconds is None:
+        found = search_range(
+            problem,
+            sparsity,
+            weights,
+            seed=seed,
+            samples=range(iterations),
+            workers=workers,
+            progress=progress,
+            skip=skip,
+        )
+        return winner(problem, found, iterations)
+    best = Best(skip=skip)
+    run = _runner(problem, sparsity, weights, seed, best)
+    with _threads(workers) as pool:
+        tried = _search_for(seconds, pool, run, workers, progress)
+    return winner(problem, Found(best.candidate, best.shortest), tried)
 
-    def run(block: int) -> int:
-        last = min((block + 1) * _BLOCK, iterations) if seconds is None else (block + 1) * _BLOCK
-        for sample in range(block * _BLOCK, last):
-            _try_draw(problem, sparsity, weights, stream(seed, sample), sample, best)
-        return last
 
-    tried = 0
-    with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
-        try:
-            if seconds is None:
-                blocks = range(-(-iterations // _BLOCK))
-                for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
-                    for tried in pool.map(run, blocks[first : first + _SLICE]):
-                        progress("searching", tried, iterations)
-            else:
-                tried = _search_for(seconds, pool, run, workers, progress)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return _winner(problem, best, tried)
+def search_range(
+    problem: Problem,
+    sparsity: Sparsity,
+    weights: Weights,
+    *,
+    seed: int,
+    samples: range,
+    bound: float = np.inf,
+    workers: int = 1,
+    progress: Progress = silent,
+    skip: bool = True,
+) -> Found:
+    """Search some of the samples; ranges that `Found.merged` joins give the answer of all of them at once.
+
+    Parameters
+    ----------
+    problem, sparsity, weights, seed, workers, progress, skip
+        As of `search`.
+    samples : range
+        Numbers r of the samples, one after the other.
+    bound : float
+        The cost of a candidate of another range: samples proven to be above it are given up.
+    """
+    best = Best(bound=bound, skip=skip)
+    run = _runner(problem, sparsity, weights, seed, best)
+    blocks = [samples[first : first + _BLOCK] for first in range(0, len(samples), _BLOCK)]
+    with _threads(workers) as pool:
+        for first in range(0, len(blocks), _SLICE):  # not all at once: there may be millions
+            for after in pool.map(run, blocks[first : first + _SLICE]):
+                progress("searching", after - samples.start, len(samples))
+    return Found(best.candidate, best.shortest)
 
 
 def evaluate(
     problem: Problem, sparsity: Sparsity, weights: Weights, *, rng: np.random.Generator, sample: int = 0
 ) -> Candidate | None:
     """Evaluate the one sample drawn from `rng`; None when it visits under two cells or breaks the budget."""
-    best = _Best()
-    _try_draw(problem, sparsity, weights, rng, sample, best)
+    best = Best()
+    try_sample(problem, sparsity, weights, rng, sample, best, Desk(problem))
     return best.candidate
+
+
+def winner(problem: Problem, found: Found, tried: int) -> Candidate:
+    """Return the winner among `tried` samples.
+
+    Raises
+    ------
+    BudgetError, DesignError
+        As `search` does, when there is none.
+    """
+    if found.candidate is not None:
+        return found.candidate
+    if problem.budget is not None and np.isfinite(found.shortest):
+        say = problem.budget.describe
+        raise BudgetError(
+            f"no route within {say(problem.budget.limit)} among {tried} samples: the shortest found "
+            f"is {say(found.shortest)}. Allow a larger --budget or more --iterations."
+        )
+    raise DesignError(
+        f"none of {tried} samples visits two cells on a path inside the area: raise --probability or lower --theta"
+    )
 
 
 def fixed_sparsity(probability: float, theta: int) -> Sparsity:
@@ -219,71 +180,39 @@ def fixed_sparsity(probability: float, theta: int) -> Sparsity:
     return lambda _rng: (probability, theta)
 
 
+def _runner(problem: Problem, sparsity: Sparsity, weights: Weights, seed: int, best: Best) -> Callable[[range], int]:
+    """Return what a worker does with a block of samples; it returns the number after the last."""
+    _ = problem.span  # computed here, once, and not by every worker
+
+    def run(block: range) -> int:
+        desk = Desk(problem)
+        for sample in block:
+            try_sample(problem, sparsity, weights, stream(seed, sample), sample, best, desk)
+        return block.stop
+
+    return run
+
+
+@contextmanager
+def _threads(workers: int) -> Iterator[ThreadPoolExecutor]:
+    """Run with a pool of threads that drops what still waits when something goes wrong."""
+    with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
 def _search_for(
-    seconds: float, pool: ThreadPoolExecutor, run: Callable[[int], int], workers: int, progress: Progress
+    seconds: float, pool: ThreadPoolExecutor, run: Callable[[range], int], workers: int, progress: Progress
 ) -> int:
     """Work through blocks until the time is up; return how many samples were tried."""
     start = time.monotonic()
-    for block in count(0, workers):
-        tried = max(pool.map(run, range(block, block + workers)))
+    for first in count(0, workers * _BLOCK):
+        tried = max(pool.map(run, [range(at, at + _BLOCK) for at in range(first, first + workers * _BLOCK, _BLOCK)]))
         passed = time.monotonic() - start
         progress("searching", int(min(passed, seconds) * 1000), int(seconds * 1000))
         if passed >= seconds:
             break
     return tried
-
-
-def _try_draw(
-    problem: Problem,
-    sparsity: Sparsity,
-    weights: Weights,
-    rng: np.random.Generator,
-    sample: int,
-    best: _Best,
-) -> None:
-    """Algorithm 1, lines 3 to 28, for one sample; gives up as soon as it cannot win any more."""
-    legs = problem.legs
-    probability, theta = sparsity(rng)
-    phi = draw_phi(rng, problem.rows, legs.size, probability, theta)
-    phi[:, ~legs.allowed] = False
-    cells = np.flatnonzero(phi.any(axis=0))
-    if cells.size < 2:  # an empty Phi has no path and would win any large lambda_path
-        return
-    stops = shortest_path(cells, legs.length, improve=problem.improve)
-    if legs.leaves(stops):
-        return
-    if problem.budget is not None:
-        used = problem.budget.used(stops, legs)
-        if used > problem.budget.limit:
-            best.too_long(used)
-            return
-    atoms = measured_atoms(phi, cells, problem.psi)
-    mu = incoherence(atoms, phi, unit_rows=problem.unit_rows)
-    length = legs.path_length(stops) / legs.cell_unit
-    known = weights.path * length + weights.incoherence * mu
-    error = reconstruction_error(problem, phi, cells, atoms, _error_limit(best.ceiling(), known, weights))
-    if error is None:
-        return
-    cost = weights.valid * error + known
-    best.offer(Candidate(sample, cost, error, length, mu, phi, stops, probability, theta))
-
-
-def _error_limit(ceiling: float, known: float, weights: Weights) -> float:
-    """Return the mean error beyond which the cost is proven to be above the best so far."""
-    if weights.valid == 0:
-        return np.inf
-    return max(ceiling * _SLACK - known, 0.0) / weights.valid * _SLACK
-
-
-def _winner(problem: Problem, best: _Best, iterations: int) -> Candidate:
-    if best.candidate is not None:
-        return best.candidate
-    if problem.budget is not None and np.isfinite(best.shortest):
-        say = problem.budget.describe
-        raise BudgetError(
-            f"no route within {say(problem.budget.limit)} among {iterations} samples: the shortest found "
-            f"is {say(best.shortest)}. Allow a larger --budget or more --iterations."
-        )
-    raise DesignError(
-        f"none of {iterations} samples visits two cells on a path inside the area: raise --probability or lower --theta"
-    )

@@ -9,14 +9,16 @@ import numpy as np
 
 from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
-from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity
+from sparsor.design.candidate import Desk, allowed_phi
+from sparsor.design.monte_carlo import evaluate
+from sparsor.design.problem import Problem, Weights
 from sparsor.errors import DesignError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.design.legs import LegTable
-    from sparsor.design.monte_carlo import Candidate, Sparsity
+    from sparsor.design.problem import Candidate, Sparsity
 
 LASSO_WEIGHTS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 _TUNING_DRAWS = 6
@@ -42,19 +44,24 @@ def choose_lasso_weight(
     rows : int
     seed : int
     """
-    kinds = (fixed_sparsity(0.03, 3), fixed_sparsity(0.014, 3))
-    scores = []
-    for weight in LASSO_WEIGHTS:
-        problem = Problem(psi, maps, weight, legs, rows, improve=False)
-        with one_blas_thread():
-            drawn = [
-                evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
-                for kind in kinds
-                for draw in range(_TUNING_DRAWS)
-            ]
-        # Each kind of Phi counts the same, whatever the size of its error: hence the logarithm.
-        scores.append(np.mean([np.log(max(one.error, 1e-300)) for one in drawn if one is not None] or [0.0]))
-    return LASSO_WEIGHTS[int(np.argmin(scores))]
+    problem = Problem(psi, maps, LASSO_WEIGHTS[0], legs, rows)
+    desk = Desk(problem)
+    logarithms = []
+    with one_blas_thread():
+        for probability in (0.03, 0.014):
+            for draw in range(_TUNING_DRAWS):
+                phi, cells = allowed_phi(problem, stream(seed, draw, _TUNING), probability, 3)
+                if cells.size >= 2:
+                    desk.measure(problem, phi, cells)
+                    logarithms.append([_log_error(problem, desk, weight) for weight in LASSO_WEIGHTS])
+    # Each kind of Phi counts the same, whatever the size of its error: hence the logarithm.
+    return LASSO_WEIGHTS[int(np.argmin(np.mean(logarithms, axis=0)))] if logarithms else LASSO_WEIGHTS[0]
+
+
+def _log_error(problem: Problem, desk: Desk, weight: float) -> float:
+    """Return the logarithm of the mean error of what the desk has measured."""
+    desk.judge(problem.span, weight)
+    return float(np.log(max(desk.errors.mean(), 1e-300)))
 
 
 def pilot(problem: Problem, sparsity: Sparsity, *, seed: int) -> list[Candidate]:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.design import Candidate
-    from sparsor.design.monte_carlo import Sparsity
+    from sparsor.design.problem import Sparsity
     from sparsor.mission.specification import MissionSpecification
 
 
