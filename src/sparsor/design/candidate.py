@@ -14,7 +14,7 @@ from sparsor.design.homotopy import Room, make_room
 from sparsor.design.lars import Atoms, make_atoms, solve_lasso
 from sparsor.design.problem import Candidate
 from sparsor.design.route import shortest_path
-from sparsor.design.sensing import draw_phi, incoherence, sum_cells
+from sparsor.design.sensing import draw_phi, incoherence, sum_cells, visited_cells
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -153,8 +153,9 @@ def allowed_phi(
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Draw a Phi over the allowed cells; return it and the cells that it visits."""
     phi = draw_phi(rng, problem.rows, problem.legs.size, probability, theta)
-    phi[:, ~problem.legs.allowed] = False
-    return phi, np.flatnonzero(phi.any(axis=0))
+    if not problem.legs.allowed.all():
+        phi[:, ~problem.legs.allowed] = False
+    return phi, visited_cells(phi)
 
 
 def _path(problem: Problem, cells: NDArray[np.int64], best: Best) -> NDArray[np.int64] | None:

@@ -35,13 +35,25 @@ def draw_phi(rng: np.random.Generator, rows: int, cells: int, probability: float
 @njit(cache=True, nogil=True)
 def _pruned(drawn: NDArray[np.float64], probability: float, theta: int) -> NDArray[np.bool_]:
     phi = drawn < probability
-    for cell in range(phi.shape[1]):
-        ones = 0
-        for m in range(phi.shape[0]):
-            ones += phi[m, cell]
-        if ones < theta:
-            phi[:, cell] = False
+    ones = np.zeros(phi.shape[1], dtype=np.uint16)
+    for m in range(phi.shape[0]):
+        for cell in range(phi.shape[1]):
+            ones[cell] += phi[m, cell]
+    kept = ones >= theta
+    for m in range(phi.shape[0]):
+        for cell in range(phi.shape[1]):
+            phi[m, cell] &= kept[cell]
     return phi
+
+
+@njit(cache=True, nogil=True)
+def visited_cells(phi: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the columns of Phi that hold a 1, ascending."""
+    seen = np.zeros(phi.shape[1], dtype=np.bool_)
+    for m in range(phi.shape[0]):
+        for cell in range(phi.shape[1]):
+            seen[cell] |= phi[m, cell]
+    return np.flatnonzero(seen)
 
 
 def measured_atoms(phi: NDArray[np.bool_], cells: NDArray[np.int64], psi: NDArray[np.float64]) -> NDArray[np.float64]:
