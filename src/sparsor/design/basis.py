@@ -30,10 +30,10 @@ def aligned(*shape: int) -> NDArray[np.float64]:
     return memory[first : first + size].reshape(shape)
 
 
-# Rows are indexed, not cut out as views: making a view counts references, with locked instructions.
+# Rows are indexed, not cut out as views, and functions inlined: both count references, with locked instructions.
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(inline="always", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def append(factor: NDArray[np.float64], gram: NDArray[np.float64], count: int, atom: int, place: int) -> bool:
     """Add the row of an atom that joins; False when it is collinear with the active ones.
 
@@ -76,7 +76,7 @@ def append(factor: NDArray[np.float64], gram: NDArray[np.float64], count: int, a
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(inline="always", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def remove(
     factor: NDArray[np.float64], fit: NDArray[np.float64], active: NDArray[np.int64], count: int, first: int
 ) -> None:
@@ -104,14 +104,14 @@ def remove(
         fit[k + 1] = cosine * b - sine * a
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(inline="always", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def add_row(rows: NDArray[np.float64], m: int, weight: float, out: NDArray[np.float64]) -> None:
     """Add ``weight * rows[m]`` to `out`."""
     for j in range(out.size):
         out[j] += weight * rows[m, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(inline="always", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def combine(rows: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """Write ``weights @ rows`` into the first places of `out`, seven rows at a time."""
     K = rows.shape[1]

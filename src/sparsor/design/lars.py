@@ -161,7 +161,7 @@ def _follow_path(atoms: Atoms, lasso_weight: float, room: Room, first: int) -> i
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always", cache=True, nogil=True)
 def _grow(atoms: Atoms, factor: NDArray[np.float64], count: int, atom: int, place: int) -> bool:
     """Add an atom's row to the factor; False when it is collinear with the active ones."""
     if not atoms.known[atom]:
