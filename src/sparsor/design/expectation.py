@@ -14,7 +14,7 @@ from sparsor.errors import DesignError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sparsor.design.monte_carlo import Candidate, Problem
+    from sparsor.design.problem import Candidate, Problem
 
 
 def expected_errors(problem: Problem, candidate: Candidate, mean: NDArray[np.float64]) -> tuple[float, float]:

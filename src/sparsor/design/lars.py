@@ -8,20 +8,47 @@ scikit-learn's ``sparse_encode``: the squared error is not divided by the number
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from sparsor.design.basis import aligned, append, combine
+from sparsor.design.homotopy import Room, advance, begin, join, leave, make_room, next_event
+from sparsor.design.optimality import descend, violation
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# An atom whose part outside the span of the active ones is below this share of its squared norm adds nothing.
-_COLLINEAR = 1e-12
 # Largest violation of the optimality conditions, as a share of max |A^T y|, that is left to rounding.
 # (An uncentred dictionary of 1024 atoms ends its path at about 1e-10.)
 _OPTIMAL = 1e-9
-_MAX_SWEEPS = 1000
+# Beyond this share the codes of the last active set are solved for once more.
+_ROUNDED = 1e-13
+
+
+class Atoms(NamedTuple):
+    """The measured atoms of one candidate, and what its targets share.
+
+    Parameters
+    ----------
+    columns, rows : arrays of float64 (K, M) and (M, K)
+        ``Phi Psi``: one atom a row, and the same transposed.
+    gram : array of float64 (K, K)
+        Inner products of the atoms; a row is filled in when its atom first joins.
+    known : array of bool (K,)
+        Which rows are.
+    """
+
+    columns: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    gram: NDArray[np.float64]
+    known: NDArray[np.bool_]
+
+
+def make_atoms(atoms: int, rows: int) -> Atoms:
+    """Return room for `atoms` measured atoms of `rows` numbers."""
+    return Atoms(aligned(atoms, rows), aligned(rows, atoms), aligned(atoms, atoms), np.zeros(atoms, dtype=np.bool_))
 
 
 def lasso(A: NDArray[np.float64], targets: NDArray[np.float64], lasso_weight: float) -> NDArray[np.float64]:
@@ -45,257 +72,120 @@ def lasso(A: NDArray[np.float64], targets: NDArray[np.float64], lasso_weight: fl
     >>> lasso(np.eye(2), np.array([[3.0, 0.5]]), 1.0)  # soft thresholding
     array([[2., 0.]])
     """
-    atoms = np.ascontiguousarray(A.T, dtype=np.float64)
-    codes = np.zeros((targets.shape[0], atoms.shape[0]))
-    gram = np.empty((atoms.shape[0], atoms.shape[0]))
-    known = np.zeros(atoms.shape[0], dtype=np.bool_)
+    M, K = A.shape
+    atoms, room = make_atoms(K, M), make_room(K, M)
+    atoms.rows[:], atoms.columns[:] = A, A.T
+    codes = np.empty((targets.shape[0], K))
     for target, code in zip(np.ascontiguousarray(targets, dtype=np.float64), codes, strict=True):
-        solve_lasso(atoms, target, lasso_weight, gram, known, code)
+        solve_lasso(atoms, target, lasso_weight, room, code)
     return codes
 
 
 @njit(cache=True, nogil=True)
 def solve_lasso(
-    atoms: NDArray[np.float64],
-    target: NDArray[np.float64],
-    lasso_weight: float,
-    gram: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    code: NDArray[np.float64],
+    atoms: Atoms, target: NDArray[np.float64], lasso_weight: float, room: Room, code: NDArray[np.float64]
 ) -> None:
     """Solve one LASSO into `code`.
 
     Parameters
     ----------
-    atoms : array of float64 (K, M)
-        Measured atoms, one a row.
+    atoms : Atoms
     target : array of float64 (M,)
     lasso_weight : float
-    gram, known : arrays (K, K) and (K,)
-        Inner products of the atoms, row by row as they are first needed; share them between targets.
+    room : Room
+        Of `make_room`.
     code : array of float64 (K,)
-        Zeros on entry, the solution on return.
+        The solution on return.
     """
-    correlation = atoms @ target
-    scale = np.abs(correlation).max()
+    K = code.size
+    code[:] = 0.0
+    combine(atoms.rows, target, room.correlation)
+    first = 0
+    for j in range(K):
+        if abs(room.correlation[j]) > abs(room.correlation[first]):
+            first = j
+    scale = abs(room.correlation[first])
     if scale <= lasso_weight:
         return
-    _follow_path(atoms, correlation, lasso_weight, gram, known, code)
-    if _violation(atoms, target, lasso_weight, code) > _OPTIMAL * scale:
-        _descend(atoms, target, lasso_weight, code, _OPTIMAL * scale)
+    count = _follow_path(atoms, lasso_weight, room, first)
+    for k in range(count):
+        code[room.active[k]] = -room.correlation[K + room.place[k]]
+    gap = violation(atoms.columns, atoms.rows, target, lasso_weight, code, room.residual, room.correlation)
+    if gap > _ROUNDED * scale:
+        _refine(room, lasso_weight, count, code)
+        gap = violation(atoms.columns, atoms.rows, target, lasso_weight, code, room.residual, room.correlation)
+    if gap > _OPTIMAL * scale:
+        descend(atoms.columns, atoms.rows, target, lasso_weight, code, _OPTIMAL * scale)
 
 
-@njit(cache=True, nogil=True)
-def _follow_path(
-    atoms: NDArray[np.float64],
-    correlation: NDArray[np.float64],
-    lasso_weight: float,
-    gram: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    code: NDArray[np.float64],
-) -> None:
-    """Follow the solution path from the largest correlation down to `lasso_weight`."""
-    K, M = atoms.shape
-    limit = min(K, M)
-    active = np.empty(limit, dtype=np.int64)
-    sign = np.empty(limit)
-    triangle = np.empty((limit, limit))  # Cholesky factor of the active atoms' Gram matrix
-    direction = np.empty(limit)
-    slope = np.empty(K)
-    out = np.zeros(K, dtype=np.uint8)  # 1: active, 2: collinear with the active atoms
-    count = 0
-    joining = int(np.argmax(np.abs(correlation)))
-    dropped = -1
-    level = abs(correlation[joining])
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _follow_path(atoms: Atoms, lasso_weight: float, room: Room, first: int) -> int:
+    """Follow the path from the largest correlation, of `first`, down to lambda; return the number of active atoms."""
+    factor, fit, active, place, sign = room.factor, room.fit, room.active, room.place, room.sign
+    correlation, slope, barrier, distance = room.correlation, room.slope, room.barrier, room.distance
+    K, limit = atoms.known.size, active.size
+    begin(correlation, slope, sign, barrier, place, K)
+    count = aside = 0
+    joining, dropped, level = first, -1, abs(correlation[first])
     for _ in range(20 * (limit + 1)):
         if joining >= 0:
-            if count < limit and _append(gram, known, atoms, active, triangle, count, joining):
+            barrier[joining] = np.inf
+            if count < limit and _grow(atoms, factor, count, joining, place[count]):
+                join(factor, fit, correlation, slope, sign, count, joining, K + place[count])
                 active[count] = joining
-                sign[count] = 1.0 if correlation[joining] > 0 else -1.0
-                out[joining] = 1
                 count += 1
-            else:
-                out[joining] = 2
+            else:  # collinear with the active atoms
+                aside += 1
         if count == 0:
-            return
-        _solve(triangle, sign, direction, count)
-        slope[:] = 0.0
-        for k in range(count):
-            weight = direction[k]
-            row = gram[active[k]]
-            for j in range(K):
-                slope[j] += weight * row[j]
-        step, joining = _next_join(correlation, slope, level, out, dropped)
-        dropping = -1
-        for k in range(count):
-            if direction[k] * sign[k] < 0.0:
-                distance = -code[active[k]] / direction[k]
-                if distance < step:
-                    step, dropping, joining = distance, k, -1
-        finished = step >= level - lasso_weight
-        if finished:
-            step = level - lasso_weight
-        for k in range(count):
-            code[active[k]] += step * direction[k]
-        if finished:
-            return
-        for j in range(K):
-            correlation[j] -= step * slope[j]
+            return 0
+        step, event = next_event(correlation, slope, sign, barrier, distance, level, dropped)
+        if step >= level - lasso_weight:
+            advance(correlation, slope, level - lasso_weight)
+            return count
+        advance(correlation, slope, step)
         level -= step
-        dropped = -1
-        if dropping >= 0:
-            dropped = active[dropping]
-            code[dropped] = 0.0
-            out[dropped] = 0
-            for k in range(dropping, count - 1):
-                active[k] = active[k + 1]
-                sign[k] = sign[k + 1]
+        joining, dropped = event, -1
+        if event >= K:
+            position = 0
+            while place[position] != event - K:
+                position += 1
+            joining, dropped = -1, active[position]
+            leave(factor, fit, active, place, correlation, slope, sign, count, position, K)
             count -= 1
-            for k in range(K):  # the span has shrunk: atoms set aside may count again
-                if out[k] == 2:
-                    out[k] = 0
-            _factorise(gram, active, triangle, dropping, count)
+            barrier[dropped] = 0.0
+            if aside > 0:  # the span has shrunk: atoms set aside may count again
+                barrier[:K] = 0.0
+                for k in range(count):
+                    barrier[active[k]] = np.inf
+                aside = 0
+    return count
 
 
-@njit(cache=True, nogil=True)
-def _next_join(
-    correlation: NDArray[np.float64],
-    slope: NDArray[np.float64],
-    level: float,
-    out: NDArray[np.uint8],
-    dropped: int,
-) -> tuple[float, int]:
-    """Return the step to where an inactive atom is as correlated as the active ones, and that atom."""
-    step = level
-    joining = -1
-    for j in range(correlation.size):
-        if out[j] != 0:
-            continue
-        rising = 1.0 - slope[j]
-        falling = 1.0 + slope[j]
-        # An atom that has just left lies on the boundary: it may come back on the other side only.
-        if rising > 1e-14 and not (j == dropped and correlation[j] > 0.0):
-            distance = (level - correlation[j]) / rising
-            if distance < step:
-                step, joining = max(distance, 0.0), j
-        if falling > 1e-14 and not (j == dropped and correlation[j] < 0.0):
-            distance = (level + correlation[j]) / falling
-            if distance < step:
-                step, joining = max(distance, 0.0), j
-    return step, joining
+@njit(inline="always", cache=True, nogil=True)
+def _grow(atoms: Atoms, factor: NDArray[np.float64], count: int, atom: int, place: int) -> bool:
+    """Add an atom's row to the factor; False when it is collinear with the active ones."""
+    if not atoms.known[atom]:
+        combine(atoms.rows, atoms.columns[atom], atoms.gram[atom])
+        atoms.known[atom] = True
+    return append(factor, atoms.gram, count, atom, place)
 
 
-@njit(cache=True, nogil=True)
-def _append(
-    gram: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    atoms: NDArray[np.float64],
-    active: NDArray[np.int64],
-    triangle: NDArray[np.float64],
-    count: int,
-    atom: int,
-) -> bool:
-    """Add an atom's row to the Cholesky factor; False when it is collinear with the active ones."""
-    if not known[atom]:
-        gram[atom] = atoms @ atoms[atom]
-        known[atom] = True
-    return _factor_row(gram, active, triangle, count, atom)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _refine(room: Room, lasso_weight: float, count: int, code: NDArray[np.float64]) -> None:
+    """Take off what rounding added along the path: ``G_a d = correlations - lambda signs``, codes plus d.
 
-
-@njit(cache=True, nogil=True)
-def _factor_row(
-    gram: NDArray[np.float64], active: NDArray[np.int64], triangle: NDArray[np.float64], row: int, atom: int
-) -> bool:
-    norm = gram[atom, atom]
-    rest = norm
-    for k in range(row):
-        value = gram[atom, active[k]]
-        for i in range(k):
-            value -= triangle[row, i] * triangle[k, i]
-        value /= triangle[k, k]
-        triangle[row, k] = value
-        rest -= value * value
-    if rest <= _COLLINEAR * norm:
-        return False
-    triangle[row, row] = np.sqrt(rest)
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _factorise(
-    gram: NDArray[np.float64],
-    active: NDArray[np.int64],
-    triangle: NDArray[np.float64],
-    first: int,
-    count: int,
-) -> None:
-    """Factorise again from row `first` on, after an atom has left."""
-    for row in range(first, count):
-        _factor_row(gram, active, triangle, row, active[row])
-
-
-@njit(cache=True, nogil=True)
-def _solve(
-    triangle: NDArray[np.float64], right: NDArray[np.float64], solution: NDArray[np.float64], count: int
-) -> None:
-    """Solve ``L L^T solution = right``."""
-    for i in range(count):
-        value = right[i]
-        for k in range(i):
-            value -= triangle[i, k] * solution[k]
-        solution[i] = value / triangle[i, i]
-    for i in range(count - 1, -1, -1):
-        value = solution[i]
-        for k in range(i + 1, count):
-            value -= triangle[k, i] * solution[k]
-        solution[i] = value / triangle[i, i]
-
-
-@njit(cache=True, nogil=True)
-def _violation(
-    atoms: NDArray[np.float64], target: NDArray[np.float64], lasso_weight: float, code: NDArray[np.float64]
-) -> float:
-    """Return the largest violation of the optimality (KKT) conditions."""
-    residual = target.copy()
-    for k in range(code.size):
-        if code[k] != 0.0:
-            residual -= code[k] * atoms[k]
-    correlation = atoms @ residual
-    worst = 0.0
-    for k in range(code.size):
-        if code[k] > 0.0:
-            gap = abs(correlation[k] - lasso_weight)
-        elif code[k] < 0.0:
-            gap = abs(correlation[k] + lasso_weight)
-        else:
-            gap = abs(correlation[k]) - lasso_weight
-        worst = max(worst, gap)
-    return worst
-
-
-@njit(cache=True, nogil=True)
-def _descend(
-    atoms: NDArray[np.float64],
-    target: NDArray[np.float64],
-    lasso_weight: float,
-    code: NDArray[np.float64],
-    tolerance: float,
-) -> None:
-    """Repair what rounding left of the path's end, by coordinate descent; rare (collinear atoms)."""
-    residual = target.copy()
-    norms = np.empty(code.size)
-    for k in range(code.size):
-        norms[k] = atoms[k] @ atoms[k]
-        if code[k] != 0.0:
-            residual -= code[k] * atoms[k]
-    for sweep in range(_MAX_SWEEPS):
-        for k in range(code.size):
-            if norms[k] == 0.0:
-                continue
-            pull = atoms[k] @ residual + norms[k] * code[k]
-            value = np.sign(pull) * max(abs(pull) - lasso_weight, 0.0) / norms[k]
-            if value != code[k]:
-                residual += (code[k] - value) * atoms[k]
-                code[k] = value
-        if sweep % 10 == 9 and _violation(atoms, target, lasso_weight, code) <= tolerance:
-            return
+    The correlations are those of the residual; ``G_a^-1 = L^-T L^-1``.
+    """
+    K = code.size
+    factor, active, place, change = room.factor, room.active, room.place, room.slope
+    for k in range(count):
+        change[K + place[k]] = 0.0
+    for k in range(count):
+        height = 0.0
+        for i in range(k + 1):
+            behind = K + place[i]
+            height += factor[k, behind] * (room.correlation[active[i]] - lasso_weight * room.sign[behind])
+        for i in range(k + 1):
+            change[K + place[i]] += height * factor[k, K + place[i]]
+    for k in range(count):
+        code[active[k]] += change[K + place[k]]

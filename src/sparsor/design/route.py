@@ -35,7 +35,15 @@ def shortest_path(cells: NDArray[np.int64], length: NDArray[np.float64], *, impr
     """
     if cells.size < 2:
         return cells.copy()
-    table = np.ascontiguousarray(length[np.ix_(cells, cells)])
+    return _path_over(cells, length, improve)
+
+
+@njit(cache=True, nogil=True)
+def _path_over(cells: NDArray[np.int64], length: NDArray[np.float64], improve: bool) -> NDArray[np.int64]:
+    table = np.empty((cells.size, cells.size))
+    for i in range(cells.size):
+        for j in range(cells.size):
+            table[i, j] = length[cells[i], cells[j]]
     order = nearest_neighbour(table)
     if improve:
         improve_path(table, order)

@@ -10,7 +10,7 @@ from scipy.special import betaincinv
 from sparsor.errors import DesignError
 
 if TYPE_CHECKING:
-    from sparsor.design.monte_carlo import Sparsity
+    from sparsor.design.problem import Sparsity
 
 THETAS = (1, 2, 3, 4)
 # Draws aim at this range of visited cells, relative to what a shortest tour through random cells allows.

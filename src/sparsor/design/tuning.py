@@ -10,17 +10,19 @@ import numpy as np
 from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
 from sparsor.core.workers import Workers, one_blas_thread, workers_of
-from sparsor.design.monte_carlo import Problem, Weights, evaluate, fixed_sparsity
+from sparsor.design.candidate import Desk, allowed_phi
+from sparsor.design.monte_carlo import evaluate
+from sparsor.design.problem import Problem, Weights
 from sparsor.errors import DesignError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.design.legs import LegTable
-    from sparsor.design.monte_carlo import Candidate, Sparsity
+    from sparsor.design.problem import Candidate, Sparsity
 
 LASSO_WEIGHTS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
-_TUNING_DRAWS = 6
+_TUNING_DRAWS, _TUNING_PROBABILITIES = 6, (0.03, 0.014)
 _PILOT_DRAWS = 32
 # Streams of the pilot draws: two numbers in the key, so that they are not the streams of the search.
 _PILOT, _TUNING = 1, 2
@@ -50,27 +52,35 @@ def choose_lasso_weight(
     rows : int
     seed : int
     workers : Workers or int
-        Who tries the values; a number is one of threads.
+        Who tries the Phi; a number is one of threads.
     progress : Progress
     """
-    hands, scores = workers_of(workers), []
-    shared = hands.share((Problem(psi, maps, 1.0, legs, rows, improve=False), seed))
+    problem = Problem(psi, maps, LASSO_WEIGHTS[0], legs, rows)
+    _ = problem.span  # computed once, and not by every worker
+    hands = workers_of(workers)
+    draws = [(probability, draw) for probability in _TUNING_PROBABILITIES for draw in range(_TUNING_DRAWS)]
+    logarithms = []
     with one_blas_thread():
-        for score in hands.map(_typical_error, shared, LASSO_WEIGHTS):
-            scores.append(score)
-            progress("choosing lambda", len(scores), len(LASSO_WEIGHTS))
-    return LASSO_WEIGHTS[int(np.argmin(scores))]
+        for done, one in enumerate(hands.map(_log_errors, hands.share((problem, seed)), draws), start=1):
+            logarithms += one
+            progress("choosing lambda", done, len(draws))
+    # Each kind of Phi counts the same, whatever the size of its error: hence the logarithm.
+    return LASSO_WEIGHTS[int(np.argmin(np.mean(logarithms, axis=0)))] if logarithms else LASSO_WEIGHTS[0]
 
 
-def _typical_error(given: tuple[Problem, int], weight: float) -> float:
-    """Return the mean logarithm of the error with a lambda: each kind of Phi counts the same, whatever its error."""
-    problem, seed = replace(given[0], lasso_weight=weight), given[1]
-    drawn = [
-        evaluate(problem, kind, Weights(), rng=stream(seed, draw, _TUNING))
-        for kind in (fixed_sparsity(0.03, 3), fixed_sparsity(0.014, 3))
-        for draw in range(_TUNING_DRAWS)
-    ]
-    return float(np.mean([np.log(max(one.error, 1e-300)) for one in drawn if one is not None] or [0.0]))
+def _log_errors(given: tuple[Problem, int], part: tuple[float, int]) -> list[list[float]]:
+    """Return the logarithm of one Phi's mean error with each lambda; nothing when it visits under two cells."""
+    (problem, seed), (probability, draw) = given, part
+    phi, cells = allowed_phi(problem, stream(seed, draw, _TUNING), probability, 3)
+    if cells.size < 2:
+        return []
+    desk = Desk(problem)
+    desk.measure(problem, phi, cells)
+    logarithms = []
+    for weight in LASSO_WEIGHTS:
+        desk.judge(problem.span, weight)
+        logarithms.append(float(np.log(max(desk.errors.mean(), 1e-300))))
+    return [logarithms]
 
 
 def pilot(problem: Problem, sparsity: Sparsity, *, seed: int) -> list[Candidate]:

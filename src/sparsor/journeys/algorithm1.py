@@ -11,7 +11,7 @@ from sparsor.design.tuning import comparable_weights, pilot
 if TYPE_CHECKING:
     from sparsor.core.workers import Workers
     from sparsor.design import Candidate, Problem
-    from sparsor.design.monte_carlo import Sparsity
+    from sparsor.design.problem import Sparsity
     from sparsor.mission.specification import MissionSpecification
 
 
