@@ -26,8 +26,8 @@ from stopwatch import fastest
 
 from sparsor.core.mavlink_scan import STAMP
 from sparsor.flightlog import read_log
+from sparsor.flightlog.messages import WANTED, read_messages
 from sparsor.flightlog.opening import LogFile
-from sparsor.flightlog.tlog import WANTED, read_messages
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # the recorded practice flight is the tests'
 from flightlog.recorded import recorded_flight
@@ -66,7 +66,7 @@ def report(path: Path, repeats: int) -> None:
 
 def count(path: Path) -> int:
     tables, _ = read_messages(LogFile(path).blocks())
-    return sum(table.records.size for table in tables.values())
+    return sum(table.order.size for table in tables.values())
 
 
 def pymavlink_count(path: Path) -> int:

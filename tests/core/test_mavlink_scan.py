@@ -117,6 +117,17 @@ def test_zeros_that_mavlink_2_leaves_out_are_there_again(message):
     kind = {30: 3, 251: 1}[message]
     scanner = TlogScanner({message})
     block = scanner.feed(log_of([(STAMP, packed(v2, 0, kind, signed=False))]), ended=True)
-    records, fields = block.payloads(message, layout)
-    assert records["length"][0] < layout.itemsize or message == 251
-    assert fields["time_boot_ms"][0] == 0
+    (group,) = scanner.groups(block)
+    assert block.records["length"][0] < layout.itemsize or message == 251
+    assert group.fields(layout)["time_boot_ms"].tolist() == [0]
+
+
+@given(st.lists(records, max_size=30))
+@settings(deadline=None)
+def test_the_groups_are_the_records_apart_by_message_and_sender(rows):
+    scanner = TlogScanner((251, 0, 30))
+    for _ in range(2):  # the second block's groups know nothing of the first one's
+        block = scanner.feed(log_of(rows), ended=True)
+        told = [(int(one["message"]), int(one["system"]), int(one["component"])) for one in block.records]
+        groups = {(one.message, one.system, one.component): one.rows.tolist() for one in scanner.groups(block)}
+        assert groups == {key: [row for row, one in enumerate(told) if one == key] for key in told}

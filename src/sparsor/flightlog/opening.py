@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from sparsor.core.progress import Progress
 
-BLOCK: Final = 4 << 20
+BLOCK: Final = 1 << 20
 _GZIP, _XZ = b"\x1f\x8b", b"\xfd7zXZ\x00"
 _BROKEN = (EOFError, gzip.BadGzipFile, lzma.LZMAError, zlib.error)
 

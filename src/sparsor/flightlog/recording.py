@@ -10,6 +10,8 @@ import numpy as np
 from sparsor.flightlog.log import AUTOPILOT, Damage
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from sparsor.flightlog.log import NamedValues, Places, Sender
@@ -35,6 +37,9 @@ class Fixes:
         `time_s` is NaN where the message does not tell.
     places : Places
     has_fix : array of bool (n,)
+    stands_for : array of int32 (n,), optional
+        How many messages each row stands for, when not each for itself: those before it that a long log's reader
+        left out, too.
     """
 
     order: NDArray[np.int64]
@@ -42,6 +47,13 @@ class Fixes:
     time_s: NDArray[np.float64]
     places: Places
     has_fix: NDArray[np.bool_]
+    stands_for: NDArray[np.int32] | None = None
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Fixes:
+        """Return some of them."""
+        stands_for = None if self.stands_for is None else self.stands_for[rows]
+        places = self.places.take(rows)
+        return Fixes(self.order[rows], self.received_s[rows], self.time_s[rows], places, self.has_fix[rows], stands_for)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +64,7 @@ class UnixTimes:
     offset_s: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Happening:
     """An event at a place in the log; kinds as in `Event`."""
 
@@ -73,8 +85,8 @@ class Recording:
     kind : str
     ticks : dict of int to Ticks
         By system.
-    fixes : dict of (int, str) to Fixes
-        By system and message; the most trusted message first.
+    fixes : dict of (int, str) to callable
+        By system and message, the most trusted message first: returns the Fixes, which are wanted one after the other.
     unix : dict of int to UnixTimes
     values : list of NamedValues
     happenings : list of Happening
@@ -85,7 +97,7 @@ class Recording:
 
     kind: str
     ticks: dict[int, Ticks] = field(default_factory=dict)
-    fixes: dict[tuple[int, str], Fixes] = field(default_factory=dict)
+    fixes: dict[tuple[int, str], Callable[[], Fixes]] = field(default_factory=dict)
     unix: dict[int, UnixTimes] = field(default_factory=dict)
     values: list[NamedValues] = field(default_factory=list)
     happenings: list[Happening] = field(default_factory=list)
