@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightlog.logs import TlogMaker, flight, place, v2
+from flightlog.logs import TlogMaker, bin_flight, flight, place, v2
 from sparsor.flightlog import samples
 from sparsor.flightlog.assembly import assemble
+from sparsor.flightlog.binlog import read_bin
 from sparsor.flightlog.positions import interpolated
 from sparsor.flightlog.sampling import MAX_GAP_S
 from sparsor.flightlog.thinning import CLOCK_S, PLACE_DEG, PLACE_M, ChangedRows, Course, Rows, ThinnedRows
@@ -175,3 +176,18 @@ def test_a_short_log_is_not_thinned():
     content = flight(60).content
     (boot,), (same,) = (assemble("x", read_tlog([content], **how)).boots for how in ({}, {"whole": 241}))
     assert boot.tracks[0].time_s.size == same.tracks[0].time_s.size == 241
+
+
+def test_a_thinned_bin_log_keeps_its_values_and_their_places():
+    content = bin_flight(120)
+    blocks = [content[at : at + 5000] for at in range(0, len(content), 5000)]
+    one, other = (assemble("x", read_bin(blocks, whole=whole)) for whole in (10**6, 50))
+    mine, theirs = (log.boots[0].tracks[0] for log in (one, other))
+    assert theirs.time_s.size < 0.2 * mine.time_s.size
+    at, known = interpolated(theirs, mine.time_s, MAX_GAP_S)
+    assert known.all()
+    assert np.abs(at.lon_deg - mine.places.lon_deg).max() <= PLACE_DEG * 1.01
+    for sensor in ("NO2S.NO2", "NO2C"):
+        whole, few = (samples(log, sensor=sensor) for log in (one, other))
+        assert whole.value.tolist() == few.value.tolist()
+        assert np.abs(whole.time_s - few.time_s).max() <= CLOCK_S

@@ -113,7 +113,7 @@ def _kind_of(file: LogFile) -> str:
     scanner.feed(head, ended=True)
     if scanner.frames and scanner.skipped < len(head) // 2:  # half of it has right checksums: no need to look further
         return "tlog"
-    messages = Dataflash([head], lambda _: False)
+    messages = Dataflash([head], lambda _: None)
     # Chance makes a frame of 8 bytes once in millions of bytes of something else, and messages need their FMT first.
     if scanner.frames and scanner.frames >= messages.count:
         return "tlog"

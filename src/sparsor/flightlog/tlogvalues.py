@@ -9,7 +9,7 @@ import numpy as np
 
 from sparsor.flightlog.log import AMBIENT, NamedValues, Sender
 from sparsor.flightlog.messages import DEBUG_FLOAT_ARRAY, DEBUG_VECT, NAMED_VALUE_FLOAT, NAMED_VALUE_INT
-from sparsor.flightlog.texts import text_of
+from sparsor.flightlog.texts import rows_by_text
 from sparsor.flightlog.thinning import Rows
 
 if TYPE_CHECKING:
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from sparsor.flightlog.messages import Table
 
 NAMED: Final = (NAMED_VALUE_FLOAT, NAMED_VALUE_INT, DEBUG_VECT, DEBUG_FLOAT_ARRAY)
-# Message to its time's column with the seconds of one count, and its values' columns.
+# Message to the columns of its time and of its values.
 _TIMES: Final = {
-    NAMED_VALUE_FLOAT: ("time_boot_ms", 1e3),
-    NAMED_VALUE_INT: ("time_boot_ms", 1e3),
-    DEBUG_VECT: ("time_usec", 1e6),
-    DEBUG_FLOAT_ARRAY: ("time_usec", 1e6),
+    NAMED_VALUE_FLOAT: "time_boot_ms",
+    NAMED_VALUE_INT: "time_boot_ms",
+    DEBUG_VECT: "time_usec",
+    DEBUG_FLOAT_ARRAY: "time_usec",
 }
 _COLUMNS: Final = {
     NAMED_VALUE_FLOAT: ("value",),
@@ -40,24 +40,20 @@ class NamedSeries:
     """The series of all senders, taken block by block."""
 
     def __init__(self) -> None:
-        self._series: defaultdict[tuple[int, Sender, bytes], Rows] = defaultdict(Rows)
+        self._series: defaultdict[tuple[int, Sender, str], Rows] = defaultdict(Rows)
 
     def add(self, message: int, sender: Sender, table: Table) -> None:
         """Take the messages of one kind and sender in a block."""
-        columns = (_TIMES[message][0], *_COLUMNS[message])
-        for raw, rows in _by_name(table.fields["name"]):
+        columns = (_TIMES[message], *_COLUMNS[message])
+        for name, rows in rows_by_text(table.fields["name"]):
             fields = table.fields[rows]
-            kept = (fields[name] for name in columns)
-            self._series[message, sender, raw].add(table.order[rows], table.received_s[rows], *kept)
+            kept = (fields[column] for column in columns)
+            self._series[message, sender, name].add(table.order[rows], table.received_s[rows], *kept)
 
     def named_values(self) -> Iterator[NamedValues]:
         """Yield the series, by message, sender and name; each is given away with it."""
-        same: dict[tuple[int, Sender, str], list[bytes]] = {}  # what stands behind a name's end may differ
-        for message, sender, raw in self._series:
-            same.setdefault((message, sender, text_of(raw)), []).append(raw)
-        for message, sender, name in sorted(same, key=lambda key: (NAMED.index(key[0]), *key[1:])):
-            parts = [self._series.pop((message, sender, raw)) for raw in same[message, sender, name]]
-            yield from _expanded(message, sender, name, _interleaved(parts))
+        for message, sender, name in sorted(self._series, key=lambda key: (NAMED.index(key[0]), *key[1:])):
+            yield from _expanded(message, sender, name, self._series.pop((message, sender, name)).joined())
 
 
 def ambient(sender: Sender, columns: tuple[np.ndarray, ...]) -> Iterator[NamedValues]:
@@ -76,29 +72,6 @@ def unwrapped_s(counts_ms: NDArray[np.uint32]) -> NDArray[np.float64]:
     if not fell.any():
         return np.asarray(counts_ms / 1e3, dtype=np.float64)
     return np.asarray((counts_ms + np.concatenate(([0], np.cumsum(fell))) * _WRAP) / 1e3, dtype=np.float64)
-
-
-def _by_name(names: np.ndarray) -> Iterator[tuple[bytes, slice | NDArray[np.intp]]]:
-    """Yield every name among some, and where it stands."""
-    if (names == names[0]).all():
-        yield names[0], slice(None)
-        return
-    numbers: dict[bytes, int] = {}
-    which = np.array([numbers.setdefault(name, len(numbers)) for name in names.tolist()], dtype=np.uint32)
-    rows = np.argsort(which, kind="stable")
-    ends = np.cumsum(np.bincount(which))
-    for raw, start, end in zip(numbers, [0, *ends.tolist()], ends.tolist(), strict=False):
-        yield raw, rows[start:end]
-
-
-def _interleaved(parts: list[Rows]) -> tuple[np.ndarray, ...]:
-    columns = parts[0].joined()
-    if len(parts) > 1:
-        others = [one.joined() for one in parts[1:]]
-        columns = tuple(np.concatenate(column) for column in zip(columns, *others, strict=True))
-        rows = np.argsort(columns[0], kind="stable")
-        columns = tuple(column[rows] for column in columns)
-    return columns
 
 
 def _expanded(message: int, sender: Sender, name: str, columns: tuple[np.ndarray, ...]) -> Iterator[NamedValues]:
