@@ -39,7 +39,7 @@ READERS = {
     "tlog": lambda data: read_tlog([data]),
     "BIN": lambda data: read_bin([data]),
     "ulg": read_ulog,
-    "CSV": read_table,
+    "CSV": lambda data: read_table([data]),
 }
 SLOW_S = 30.0
 MOST_BYTES = 400_000

@@ -16,6 +16,7 @@ from sparsor.errors import LogError
 from sparsor.flightlog import read_log, read_logs, samples
 from sparsor.flightlog.assembly import assemble
 from sparsor.flightlog.binlog import read_bin
+from sparsor.flightlog.opening import LogFile
 from sparsor.flightlog.table import read_table
 from sparsor.flightlog.ulog import read_ulog
 
@@ -141,11 +142,11 @@ TABLES = {
 @pytest.mark.parametrize("kind", TABLES)
 def test_tables_come_in_many_shapes(kind):
     text = TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z")
-    (values,) = read_table(text.encode()).values
+    (values,) = read_table([text.encode()]).values
     assert values.value.tolist() == [7.5]
     assert values.places is not None
     assert (values.places.lon_deg.tolist(), values.places.lat_deg.tolist()) == ([51.5], [25.3])
-    log = assemble("t.csv", read_table(text.encode()))
+    log = assemble("t.csv", read_table([text.encode()]))
     if "12" in text[-40:] and kind in ("other names", "tabs and milliseconds"):
         assert values.stamp_s.tolist() == [12.25]
     else:
@@ -154,13 +155,13 @@ def test_tables_come_in_many_shapes(kind):
 
 def test_a_missing_value_leaves_out_only_itself():
     text = "time,lon,lat,NO2,O3\n1,51.5,25.3,1,\n2,51.5,25.3,,3\n3,,25.3,4,5\n4,51.5,25.3,6,7\n"
-    recording = read_table(text.encode())
+    recording = read_table([text.encode()])
     assert {values.name: values.value.tolist() for values in recording.values} == {"NO2": [1.0, 6.0], "O3": [3.0, 7.0]}
     assert recording.damage.places == 1
 
 
 def readers(content):
-    for read in (lambda data: read_bin([data], "NO2S.NO2"), read_ulog, read_table):
+    for read in (lambda data: read_bin([data], "NO2S.NO2"), read_ulog, lambda data: read_table([data])):
         yield lambda read=read: assemble("damaged", read(content))
 
 
@@ -204,15 +205,33 @@ def test_a_cut_in_a_bin_log_costs_the_message_it_cuts():
         assert set(b.value.tolist()) <= set(a.value.tolist())
 
 
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("kind", TABLES)
+def test_the_blocks_of_a_table_never_matter(kind, size):
+    text = "\ufeff" + TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z") + 'no time,"a\nb",\u00b5\n\n'
+    content = text.encode()
+    one, other = read_table([content]), read_table([content[at : at + size] for at in range(0, len(content), size)])
+    assert [v.value.tolist() for v in one.values] == [v.value.tolist() for v in other.values]
+    assert one.damage == other.damage
+
+
+def test_a_log_that_has_to_be_read_at_once_may_not_be_endless(tmp_path):
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(ulog_flight(5))
+    with pytest.raises(LogError, match=r"flight\.ulg' is longer than 0\.0 GB .* give the logs of single flights"):
+        LogFile(path).contents(most=1000)
+    assert LogFile(path).contents() == path.read_bytes()
+
+
 @pytest.mark.parametrize("time", ["01.05.2024 12:00:00", "12:00:00", ""])
 def test_a_table_whose_times_nobody_can_read_is_refused(time):
     with pytest.raises(LogError, match="none of its 1 rows has a time and a place"):
-        read_table(f"time,lon,lat,NO2\n{time},51.5,25.3,1\n".encode())
+        read_table([f"time,lon,lat,NO2\n{time},51.5,25.3,1\n".encode()])
 
 
 def test_a_table_without_a_value_is_refused():
     with pytest.raises(LogError, match="no number stands under NO2, O3"):
-        read_table(b"time,lon,lat,NO2,O3\n1,51.5,25.3,nan,\n")
+        read_table([b"time,lon,lat,NO2,O3\n1,51.5,25.3,nan,\n"])
 
 
 SHORT_BIN, SHORT_ULOG, SHORT_TABLE = bin_flight(5), ulog_flight(5), table_flight(5)

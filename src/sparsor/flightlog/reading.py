@@ -90,7 +90,7 @@ def _recording(file: LogFile, sensor: str | None) -> Recording:
             return read_tlog(file.blocks())
         if kind == "BIN":
             return read_bin(file.blocks(), sensor)
-        return read_ulog(file.contents()) if kind == "ulg" else read_table(file.contents())
+        return read_ulog(file.contents()) if kind == "ulg" else read_table(file.blocks())
     except LogError as error:
         if str(file.path) in str(error):
             raise
