@@ -208,8 +208,8 @@ def test_a_cut_in_a_bin_log_costs_the_message_it_cuts():
 @pytest.mark.parametrize("size", [1, 7, 1000])
 @pytest.mark.parametrize("kind", TABLES)
 def test_the_blocks_of_a_table_never_matter(kind, size):
-    text = "\ufeff" + TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z") + 'no time,"a\nb",\u00b5\n\n'
-    content = text.encode()
+    text = TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z")
+    content = f'\ufeff{text}no time,"a\nb",\u00b5\n\n'.encode()
     one, other = read_table([content]), read_table([content[at : at + size] for at in range(0, len(content), size)])
     assert [v.value.tolist() for v in one.values] == [v.value.tolist() for v in other.values]
     assert one.damage == other.damage

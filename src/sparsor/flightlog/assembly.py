@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sparsor.flightlog.recording import Fixes, Recording, Ticks
+    from sparsor.flightlog.recording import Fixes, PackedFixes, Recording, Ticks
 
 
 def assemble(name: str, recording: Recording) -> FlightLog:
@@ -55,7 +54,7 @@ def _boots(system: int, clock: Clock, recording: Recording) -> Iterator[Boot]:
     tracks: dict[int, list[Track]] = {number: [] for number in range(int(clock.boot[-1]) + 1)}
     for owner, message in list(recording.fixes):
         if owner == system:  # and given away: a long log is not held twice
-            for number, track in _tracks(message, recording.fixes.pop((owner, message))(), clock):
+            for number, track in _tracks(message, recording.fixes.pop((owner, message)), clock):
                 tracks[number].append(track)
     told_s = _told_offsets(system, clock, recording)
     edges = np.searchsorted(clock.boot, range(len(tracks) + 1))  # boots follow each other in a file
@@ -68,12 +67,11 @@ def _boots(system: int, clock: Clock, recording: Recording) -> Iterator[Boot]:
         yield Boot(system, number, float(time_s.min()), float(time_s.max()), offset_s, source, tuple(own))
 
 
-def _tracks(message: str, fixes: Fixes, clock: Clock) -> Iterator[tuple[int, Track]]:
+def _tracks(message: str, fixes: Fixes | PackedFixes, clock: Clock) -> Iterator[tuple[int, Track]]:
     heard_s, boot = clock.at(fixes.order, fixes.received_s)
-    timed = replace(fixes, time_s=np.where(np.isnan(fixes.time_s), heard_s, fixes.time_s))
     for number, rows in _runs(boot):
-        own = timed.take(rows)
-        yield number, believed_track(message, own, own.time_s)
+        own = fixes.take(rows)
+        yield number, believed_track(message, own, np.where(np.isnan(own.time_s), heard_s[rows], own.time_s))
 
 
 def _told_offsets(system: int, clock: Clock, recording: Recording) -> dict[int, float]:

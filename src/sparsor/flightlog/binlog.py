@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -69,7 +68,7 @@ def read_bin(blocks: Iterable[bytes], sensor: str | None = None, whole: int = WH
     recording.ticks[system] = _ticks(messages.values(), whole)
     for name in ("POS", "GPS"):
         if name in messages and all(column in messages[name] for column in _PLACE_COLUMNS):
-            recording.fixes[system, name] = partial(_fixes, messages[name])
+            recording.fixes[system, name] = _fixes(messages[name])
     if "GPS" in messages:
         recording.unix[system] = _unix(messages["GPS"])
     recording.happenings = list(_happenings(system, messages))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from sparsor.flightlog.log import AUTOPILOT, Damage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from sparsor.flightlog.log import NamedValues, Places, Sender
@@ -56,6 +54,21 @@ class Fixes:
         return Fixes(self.order[rows], self.received_s[rows], self.time_s[rows], places, self.has_fix[rows], stands_for)
 
 
+class PackedFixes(Protocol):
+    """Positions in fewer bytes than `Fixes` has, which they become row by row."""
+
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """Places in the log."""
+
+    @property
+    def received_s(self) -> NDArray[np.float64]:
+        """Unix time on the recorder's clock."""
+
+    def take(self, rows: NDArray[np.intp] | slice) -> Fixes:
+        """Return some of them."""
+
+
 @dataclass(frozen=True, eq=False)
 class UnixTimes:
     """What a vehicle says about the time of day: unix time less time since boot, seconds."""
@@ -85,8 +98,8 @@ class Recording:
     kind : str
     ticks : dict of int to Ticks
         By system.
-    fixes : dict of (int, str) to callable
-        By system and message, the most trusted message first: returns the Fixes, which are wanted one after the other.
+    fixes : dict of (int, str) to Fixes, or to what holds them in fewer bytes
+        By system and message; the most trusted message first.
     unix : dict of int to UnixTimes
     values : list of NamedValues
     happenings : list of Happening
@@ -97,7 +110,7 @@ class Recording:
 
     kind: str
     ticks: dict[int, Ticks] = field(default_factory=dict)
-    fixes: dict[tuple[int, str], Callable[[], Fixes]] = field(default_factory=dict)
+    fixes: dict[tuple[int, str], Fixes | PackedFixes] = field(default_factory=dict)
     unix: dict[int, UnixTimes] = field(default_factory=dict)
     values: list[NamedValues] = field(default_factory=list)
     happenings: list[Happening] = field(default_factory=list)

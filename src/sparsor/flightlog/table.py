@@ -105,7 +105,7 @@ def _recorded(
         time_s = time_s - start_s
     recording.ticks[_SYSTEM] = Ticks(order, received_s, time_s)
     everywhere = np.ones(order.size, dtype=np.bool_)
-    recording.fixes[_SYSTEM, MESSAGE] = lambda: Fixes(order, received_s, time_s, places, everywhere)
+    recording.fixes[_SYSTEM, MESSAGE] = Fixes(order, received_s, time_s, places, everywhere)
     sender = Sender(_SYSTEM, AUTOPILOT)
     for place, name in names:
         value = numbers[place][good]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
@@ -118,12 +119,9 @@ class _Heard:
         """Give a recording what the autopilot of a system said."""
         recording.ticks[system] = _ticks(self._clock.joined())
         recording.unix[system] = _unix(self._unix.joined())
-        for message, rows, fixes in (
-            ("GLOBAL_POSITION_INT", self._estimated, _estimated),
-            ("GPS_RAW_INT", self._received, _received),
-        ):
+        for message, rows in (("GLOBAL_POSITION_INT", self._estimated), ("GPS_RAW_INT", self._received)):
             if columns := rows.joined():
-                recording.fixes[system, message] = partial(fixes, *columns)
+                recording.fixes[system, message] = _Positions(*columns)
         recording.happenings += self._states.happenings(system)
 
     def ambient(self, sender: Sender) -> Iterator[NamedValues]:
@@ -157,17 +155,29 @@ def _unix(columns: tuple[np.ndarray, ...]) -> UnixTimes:
     return UnixTimes(order, fields["time_unix_usec"] / 1e6 - fields["time_boot_ms"] / 1e3)
 
 
-def _estimated(order: np.ndarray, stamp_us: np.ndarray, fields: np.ndarray, stands_for: np.ndarray) -> Fixes:
-    places = Places(fields["lon"] / 1e7, fields["lat"] / 1e7, fields["alt"] / 1e3, fields["relative_alt"] / 1e3)
-    has_fix = np.ones(fields.size, dtype=np.bool_)
-    return Fixes(order, stamp_us / 1e6, fields["time_boot_ms"] / 1e3, places, has_fix, stands_for)
+@dataclass(frozen=True, eq=False)
+class _Positions:
+    """Messages of GLOBAL_POSITION_INT, or some fields of GPS_RAW_INT, as they came; columns as in `Table`."""
 
+    order: NDArray[np.int64]
+    stamp_us: NDArray[np.uint64]
+    fields: np.ndarray
+    stands_for: NDArray[np.int32]
 
-def _received(order: np.ndarray, stamp_us: np.ndarray, fields: np.ndarray, stands_for: np.ndarray) -> Fixes:
-    unknown = np.full(fields.size, np.nan)
-    places = Places(fields["lon"] / 1e7, fields["lat"] / 1e7, fields["alt"] / 1e3, unknown)
-    has_fix = fields["fix_type"] >= _FIX_3D
-    return Fixes(order, stamp_us / 1e6, _since_boot_s(fields), places, has_fix, stands_for)
+    @property
+    def received_s(self) -> NDArray[np.float64]:
+        return np.asarray(self.stamp_us / 1e6, dtype=np.float64)
+
+    def take(self, rows: NDArray[np.intp] | slice) -> Fixes:
+        fields = self.fields[rows]
+        if "relative_alt" in (fields.dtype.names or ()):
+            height_m, time_s = fields["relative_alt"] / 1e3, fields["time_boot_ms"] / 1e3
+            has_fix = np.ones(fields.size, dtype=np.bool_)
+        else:
+            height_m, time_s = np.full(fields.size, np.nan), _since_boot_s(fields)
+            has_fix = fields["fix_type"] >= _FIX_3D
+        places = Places(fields["lon"] / 1e7, fields["lat"] / 1e7, fields["alt"] / 1e3, height_m)
+        return Fixes(self.order[rows], self.stamp_us[rows] / 1e6, time_s, places, has_fix, self.stands_for[rows])
 
 
 def _since_boot_s(fields: np.ndarray) -> NDArray[np.float64]:

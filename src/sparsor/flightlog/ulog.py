@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import struct
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,7 +124,7 @@ def _add_positions(recording: Recording, topics: dict[str, Columns], order: _Ord
     home_m = _home_altitude_m(topics)
     if estimate is not None and {"lat", "lon", "alt"} <= set(estimate):
         places = Places(estimate["lon"], estimate["lat"], estimate["alt"].astype(np.float64), estimate["alt"] - home_m)
-        recording.fixes[_SYSTEM, "vehicle_global_position"] = partial(_fixes, estimate, places, order)
+        recording.fixes[_SYSTEM, "vehicle_global_position"] = _fixes(estimate, places, order)
     for name in ("vehicle_gps_position", "sensor_gps"):
         gps = topics.get(name)
         degrees, scaled = ({"longitude_deg", "latitude_deg", "altitude_msl_m"}, {"lon", "lat", "alt"})
@@ -136,7 +135,7 @@ def _add_positions(recording: Recording, topics: dict[str, Columns], order: _Ord
         else:
             lon, lat, alt = gps["lon"] / 1e7, gps["lat"] / 1e7, gps["alt"] / 1e3
         places = Places(lon, lat, np.asarray(alt, np.float64), np.asarray(alt - home_m, np.float64))
-        recording.fixes[_SYSTEM, name] = partial(_fixes, gps, places, order, gps["fix_type"] >= _FIX_3D)
+        recording.fixes[_SYSTEM, name] = _fixes(gps, places, order, gps["fix_type"] >= _FIX_3D)
         if "time_utc_usec" in gps:
             valid = gps["time_utc_usec"] > 0
             offset_s = gps["time_utc_usec"] / 1e6 - gps["timestamp"] / 1e6
