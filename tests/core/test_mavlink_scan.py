@@ -102,6 +102,17 @@ def test_an_unknown_message_that_claims_true_frames_does_not_get_them():
     assert scanner.unknown == 0
 
 
+def test_a_true_frame_behind_half_a_stamp_is_not_taken_for_an_unknown_message():
+    sender = v2.MAVLink(None, 1, 1)
+    sender.seq = 0xFD  # with what follows, the head of a message that nobody knows: found by fuzz_logs.py
+    value = v2.MAVLink_named_value_float_message(180_000, b"NO2", 1.5).pack(sender)
+    beat = packed(v2, 7, 0, signed=False)
+    cut = log_of([(STAMP, value)])[4:]
+    found, scanner = scan(log_of([(STAMP, beat)]) + cut + log_of([(STAMP, beat)] * 3))
+    assert [one[2] for one in found] == [0, 251, 0, 0, 0]
+    assert scanner.unknown == 0
+
+
 def test_the_senders_counters_tell_what_is_missing():
     rows = [(STAMP, packed(v2, number, 0, signed=False)) for number in (6, 12, 24, 30)]  # one sender
     _, scanner = scan(log_of(rows))

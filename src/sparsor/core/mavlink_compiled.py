@@ -89,7 +89,8 @@ def scan(
         at = end + STAMP
         if not searching:
             length = _frame_length(data, at, tables, extras)
-            if length < _BAD and _next_frame(data, at + 1, at - length, tables, extras) < 0:
+            # What has a checksum that nobody knows is believed where nothing with a right one lies.
+            if length < _BAD and _next_frame(data, end, at - length, tables, extras) < 0:
                 totals[STRANGE] += 1
                 end = at - length
                 continue

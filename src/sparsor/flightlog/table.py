@@ -128,17 +128,28 @@ def _lines(blocks: Iterable[bytes]) -> Iterator[str]:
 
 
 def _rows(blocks: Iterable[bytes]) -> Iterator[list[str]]:
-    """Yield the rows that are not empty, the header first."""
+    """Yield the rows that are not empty, the header first; one that cannot be parsed has no cells.
+
+    Only the header may go on in the next line between quotation marks: elsewhere one that damage made would take the
+    rows behind it.
+    """
     lines = _lines(blocks)
     first = next(lines)
     delimiter = max(";\t,", key=first.count)
-    rows = (row for row in csv.reader(chain([first], lines), delimiter=delimiter) if row)
     try:
-        for number, row in enumerate(rows):
-            decimal_comma = number > 0 and delimiter != ","
-            yield [cell.strip().replace(",", ".") if decimal_comma else cell.strip() for cell in row]
+        header = next((row for row in csv.reader(chain([first], lines), delimiter=delimiter) if row), [])
     except csv.Error as error:
         raise LogError(f"it is not a table ({error}); give {_NEEDED}") from error
+    yield [cell.strip() for cell in header]
+    for line in lines:
+        text = line.strip("\r\n").replace("\r", " ")
+        if not text:
+            continue
+        try:
+            (row,) = csv.reader([text], delimiter=delimiter)
+        except csv.Error:
+            row = []
+        yield [cell.strip() if delimiter == "," else cell.strip().replace(",", ".") for cell in row]
 
 
 def _columns(
