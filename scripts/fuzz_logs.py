@@ -13,14 +13,13 @@ slow readers of its own (fuzz_records.py). In a .tlog
 but for frames of chance whose checksum is right (one false beginning in 65 536): those are collisions, counted apart.
 The other kinds have no checksum: damage inside a record cannot be told from data. Where the definitions are whole
 
-  - .BIN: every value that is read decodes from a message that stands in the bytes; every value is read whose message
-    was not touched and leads to the next one. "Collisions" are damaged messages whose length led beyond such a one.
-  - .ulg: every value that is read decodes from a message that stands in the bytes. How pyulog finds its way behind
-    damage is its own affair: the share of untouched values that it finds is printed.
+  - .BIN, .ulg: every value that is read decodes from a message that stands in the bytes; every value is read whose
+    message was not touched and leads to the next one. "Collisions" are damaged bytes that pass for a message, the
+    length of which led beyond such a one.
   - CSV: every value that is read stands in a cell; every row is read that was not touched.
 
-With --atheris the same reading is then driven by coverage, each log in turn, where the package `atheris` is installed;
-compiled loops run uncompiled there, so that they are seen. Exit 1 when there is a fault.
+With --atheris the reading is then driven by coverage, each log in turn, where the package `atheris` is installed
+(fuzz_coverage.py). Exit 1 when there is a fault.
 """
 
 from __future__ import annotations
@@ -28,11 +27,14 @@ from __future__ import annotations
 import argparse
 import math
 import random
+import re
+import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from contextlib import suppress
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -61,6 +63,7 @@ READERS = {
 SLOW_S = 30.0
 MOST_BYTES = 400_000
 MOST_BIN_BYTES = 6_000_000
+SEED_BYTES = 3000
 SHUFFLED = 0.2  # of the runs
 MAGIC_2 = b"\xfd"
 
@@ -70,13 +73,13 @@ def main() -> int:
     parser.add_argument("logs", nargs="*", type=Path)
     parser.add_argument("--runs", type=int, default=2000, help="for each log")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--atheris", type=int, metavar="SECONDS", help="then go on by coverage, on the first log")
+    parser.add_argument("--atheris", type=int, metavar="SECONDS", help="then go on by coverage, so long on each log")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         logs = options.logs or made_logs(Path(folder))
         faults = sum(damaged_runs(path, options.runs, options.seed) for path in logs)
         if options.atheris:
-            by_coverage(logs[0], options.atheris)
+            faults += sum(by_coverage(path, options.atheris) for path in logs)
     return 1 if faults else 0
 
 
@@ -151,7 +154,7 @@ def ulog_beginning(whole: bytes) -> int:
     at = 16
     while whole[at + 2 : at + 3] != b"D":
         at += 3 + int.from_bytes(whole[at : at + 2], "little")
-    return at
+    return at + 5  # with the next head, without which the last definition is not believed
 
 
 def judge_whole(path: Path, found: Counter | None, known: Counter) -> None:
@@ -163,7 +166,7 @@ def judge_whole(path: Path, found: Counter | None, known: Counter) -> None:
 def judge(kind, data, traces, found, known, there) -> str:
     """Return whether what was read is "right", explained by "collisions", or not: "faults"."""
     expected = sum((record.values for record in there.values()), Counter())
-    missing = expected - found if kind != "ulg" else Counter()
+    missing = expected - found
     invented = set(found - known)
     if kind != "tlog" and invented:  # what the whole log lacks may stand there now
         invented -= fuzz_records.values_anywhere(kind, data)
@@ -268,20 +271,27 @@ def shuffled(whole: bytes, draw: random.Random, spare: int) -> np.ndarray:
     return np.concatenate(pieces)
 
 
-def by_coverage(path: Path, seconds: int) -> None:
-    try:
-        import atheris
-    except ImportError:
+def by_coverage(path: Path, seconds: int) -> int:
+    """Let `fuzz_coverage.py` change a small piece of a log; return whether it found a fault."""
+    if find_spec("atheris") is None:
         sys.exit("atheris is not installed: pip install atheris (Linux, CPython 3.11 to 3.13)")
-    kind, seed = read_log(path).kinds[0], LogFile(path).contents()[:20_000]
-
-    def one_input(data: bytes) -> None:
-        cut = len(data) * 7 % len(seed)
-        values_in(kind, seed[:cut] + data + seed[cut:])
-
-    atheris.instrument_func(one_input)
-    atheris.Setup([sys.argv[0], f"-max_total_time={seconds}", "-timeout=30"], one_input)
-    atheris.Fuzz()
+    kind, whole = short_log(path)
+    with tempfile.TemporaryDirectory() as folder:
+        begin = beginning(kind, whole) % SEED_BYTES  # most of what defines the rest, and some of it
+        for number, size in enumerate((300, 2000, begin + SEED_BYTES)):
+            (Path(folder) / f"{number}.{kind}").write_bytes(whole[:size])
+        script = Path(__file__).with_name("fuzz_coverage.py")
+        ended = subprocess.run(
+            [sys.executable, str(script), kind, folder, str(seconds)], capture_output=True, text=True, check=False
+        )
+    stats = dict(re.findall(r"stat::(\w+):\s*(\d+)", ended.stderr))
+    tried = stats.get("number_of_executed_units", "no")
+    print(
+        f"{path.name}: {kind}, by coverage {tried} inputs in {seconds} s, ",
+        end="",
+    )
+    print("no fault" if ended.returncode == 0 else f"a fault (its input is in this folder):\n{ended.stderr[-3000:]}")
+    return int(ended.returncode != 0)
 
 
 if __name__ == "__main__":

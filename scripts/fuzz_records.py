@@ -31,14 +31,11 @@ CODES = dict(zip(LETTERS, ("64s", *"bBhHiIfd", "4s", "16s", "64s", *"hHiIiBqQ"),
 SCALES = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
 TEXTS = "anNZ"
 ULOG_SIZES = {
-    "uint64_t": "Q",
-    "float": "f",
-    "double": "d",
-    "uint8_t": "B",
-    "bool": "B",
-    "int32_t": "i",
-    "uint32_t": "I",
+    f"{sign}int{8 * size}_t": code
+    for sign, codes in (("", "bhiq"), ("u", "BHIQ"))
+    for size, code in zip((1, 2, 4, 8), codes, strict=True)
 }
+ULOG_SIZES |= {"float": "f", "double": "d", "bool": "B", "char": "B"}
 
 
 @dataclass(frozen=True)
@@ -110,34 +107,38 @@ def finite(values: set) -> Counter:
 
 
 def ulog_records(data: bytes) -> list[Record]:
-    """Return every message of the topic debug_key_value that decodes anywhere, by the first description of it."""
-    layout, topic = ulog_topic(data, b"debug_key_value")
-    if layout is None:
-        return []
-    size = struct.calcsize(layout[0])
-    head = struct.pack("<HcH", size + 2, b"D", topic)
+    """Return every message of data that decodes anywhere, with the values of the topic debug_key_value."""
     found = []
-    at = data.find(head)
-    while at >= 0:
-        if at + 5 + size <= len(data):
-            row = dict(zip(layout[1], struct.unpack(layout[0], data[at + 5 : at + 5 + size]), strict=True))
-            text = row["key"].partition(b"\0")[0].decode("utf-8", "replace").strip()
-            found.append(Record(at, size + 5, finite({(text, row["value"])})))
-        at = data.find(head, at + 1)
+    for topic, (name, codes, fields) in ulog_topics(data).items():
+        size = struct.calcsize(codes)
+        head = struct.pack("<HcH", size + 2, b"D", topic)
+        at = data.find(head)
+        while at >= 0:
+            if at + 5 + size <= len(data):
+                row = dict(zip(fields, struct.unpack(codes, data[at + 5 : at + 5 + size]), strict=True))
+                values = Counter()
+                if name == "debug_key_value":
+                    text = row["key"].partition(b"\0")[0].decode("utf-8", "replace").strip()
+                    values = finite({(text, row["value"])})
+                found.append(Record(at, size + 5, values, guard=5))
+            at = data.find(head, at + 1)
     return found
 
 
-def ulog_topic(data: bytes, name: bytes):
-    at, layout = 16, None
-    while at + 3 <= len(data):
+def ulog_topics(data: bytes) -> dict[int, tuple[str, str, list[str]]]:
+    """Return the topics that are described before the first message of data: their names, codes and fields."""
+    at, formats, topics = 16, {}, {}
+    while at + 3 <= len(data) and data[at + 2 : at + 3] != b"D":
         size, kind = struct.unpack("<Hc", data[at : at + 3])
         body = data[at + 3 : at + 3 + size]
-        if kind == b"F" and body.startswith(name + b":"):
-            layout = ulog_layout([one.split(" ") for one in body.decode().partition(":")[2].split(";") if one])
-        if kind == b"A" and body[3:] == name:
-            return layout, int.from_bytes(body[1:3], "little")
+        if kind == b"F":
+            name, _, fields = body.decode("utf-8", "replace").partition(":")
+            formats[name] = ulog_layout([one.split(" ") for one in fields.split(";") if " " in one])
+        if kind == b"A" and body[3:].decode("utf-8", "replace") in formats:
+            name = body[3:].decode()
+            topics[int.from_bytes(body[1:3], "little")] = (name, *formats[name])
         at += 3 + size
-    return None, 0
+    return topics
 
 
 def ulog_layout(fields: list[list[str]]):
@@ -146,7 +147,7 @@ def ulog_layout(fields: list[list[str]]):
     codes, names = "<", []
     for kind, name in fields:
         base, _, size = kind.rstrip("]").partition("[")
-        codes += f"{size}s" if base == "char" else ULOG_SIZES[base] * int(size or 1)
+        codes += f"{size}s" if base == "char" else ULOG_SIZES.get(base, "") * int(size or 1)
         names += [name] if base == "char" or not size else [f"{name}[{place}]" for place in range(int(size))]
     return codes, names
 

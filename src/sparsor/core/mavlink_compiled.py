@@ -158,7 +158,7 @@ def _frame_length(data: NDArray[np.uint8], at: int, tables: NDArray[np.uint16], 
     if not first and data[at] != MAGIC_V2:
         return _BAD
     header = HEADER_V1 if first else HEADER_V2
-    flags = 0 if first else data[at + 2]
+    flags = 0 if first else int(data[at + 2])
     if flags & ~SIGNED:
         return _BAD
     covered = header + int(data[at + 1])
@@ -166,7 +166,7 @@ def _frame_length(data: NDArray[np.uint8], at: int, tables: NDArray[np.uint16], 
     if at + length > data.size:
         return _BAD
     message = _message_id(data, at)
-    extra = extras[message] if message < IDS else -1
+    extra = int(extras[message]) if message < IDS else -1
     if extra < 0:
         return -length
     crc = _checksum(data, at + 1, at + covered, tables)
