@@ -43,7 +43,7 @@ import numpy as np
 import fuzz_records
 from sparsor.core.mavlink_scan import STAMP
 from sparsor.errors import LogError
-from sparsor.flightlog import AMBIENT, read_log, samples
+from sparsor.flightlog import AMBIENT, read_log, samples, ulog
 from sparsor.flightlog.assembly import assemble
 from sparsor.flightlog.binlog import read_bin
 from sparsor.flightlog.opening import LogFile
@@ -74,7 +74,10 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=2000, help="for each log")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--atheris", type=int, metavar="SECONDS", help="then go on by coverage, so long on each log")
+    parser.add_argument("--pyulog-alone", action="store_true", help="read damaged .ulg files without mending them")
     options = parser.parse_args()
+    if options.pyulog_alone:
+        ulog.mended = lambda contents: (contents, 0, 0)
     with tempfile.TemporaryDirectory() as folder:
         logs = options.logs or made_logs(Path(folder))
         faults = sum(damaged_runs(path, options.runs, options.seed) for path in logs)
