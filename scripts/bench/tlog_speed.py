@@ -5,8 +5,9 @@
 
 Without a log it records a flight of the practice autopilot and repeats it, boot after boot, to each size. Both decode
 the messages that a map needs and pass over the others; pymavlink through `mavlink_connection`, once, and not on logs of
-more than 200 MB, for which it takes minutes. The peak of memory is that of a process of its own, above what an idle one
-has (Linux); how it and the time grow from log to log is printed last.
+more than 200 MB, for which it takes minutes. Times are the processor's, so that whatever else runs does not count. The
+peak of memory is that of a process of its own, above what an idle one has (Linux); how it and the time grow from log to
+log is printed last.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from stopwatch import fastest
 
 from sparsor.core.mavlink_scan import STAMP
 from sparsor.flightlog import read_log
@@ -35,6 +36,10 @@ from sparsor.flightlog.opening import LogFile
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # the recorded practice flight is the tests'
 from flightlog.recorded import recorded_flight
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+T = TypeVar("T")
 PAUSE_US = 60_000_000
 MOST_BYTES = 200_000_000
 
@@ -49,7 +54,7 @@ def main() -> None:
         logs = options.logs or made_logs(Path(folder), sorted(options.megabytes))
         read_log(logs[0])  # compiled now
         rows = [report(path, options.repeats) for path in logs]
-    for (size, seconds, peak), (larger, longer, higher) in pairwise([] if options.logs else rows):
+    for (size, seconds, peak), (larger, longer, higher) in pairwise(sorted(rows)):
         print(
             f"from {size:.0f} to {larger:.0f} MB: {100 * (higher - peak) / (larger - size):.1f} MB of memory and "
             f"{100 * (longer - seconds) / (larger - size):.2f} s for every 100 MB"
@@ -59,14 +64,12 @@ def main() -> None:
 def report(path: Path, repeats: int) -> tuple[float, float, float]:
     """Print what one log takes; return its megabytes, our seconds and our peak of memory, MB."""
     size = path.stat().st_size
-    frames_s, ours = fastest(lambda: count(path), repeats) if size <= MOST_BYTES else (None, None)
-    log_s, _ = fastest(lambda: read_log(path), repeats)
+    frames_s, ours = least_cpu(lambda: count(path), repeats) if size <= MOST_BYTES else (None, None)
+    log_s, _ = least_cpu(lambda: read_log(path), repeats)
     print(f"{path.name}: {size / 1e6:.1f} MB")
     if frames_s is not None:
-        start = time.perf_counter()
-        theirs = pymavlink_count(path)
-        pymavlink_s = time.perf_counter() - start
-        again_s, _ = fastest(lambda: read_log(path), repeats)  # the machine may be busier now than it was before
+        pymavlink_s, theirs = least_cpu(lambda: pymavlink_count(path), 1)
+        again_s, _ = least_cpu(lambda: read_log(path), repeats)  # the machine may be busier now than it was before
         print(f"  wanted messages      {ours}, by pymavlink {theirs}")
         print(f"  pymavlink            {line(pymavlink_s, size)}")
         print(f"  our messages         {line(frames_s, size)}  {pymavlink_s / frames_s:6.0f} x")
@@ -77,6 +80,16 @@ def report(path: Path, repeats: int) -> tuple[float, float, float]:
     peak = peak_mb(path)
     print(f"  our peak of memory   {peak:8.0f} MB")
     return size / 1e6, log_s, peak
+
+
+def least_cpu(action: Callable[[], T], repeats: int) -> tuple[float, T]:
+    """Return the fewest seconds of the processor that an action took, and its result."""
+    taken_s = []
+    for _ in range(repeats):
+        start = time.process_time()
+        result = action()
+        taken_s.append(time.process_time() - start)
+    return min(taken_s), result
 
 
 def line(seconds: float, size: int) -> str:
