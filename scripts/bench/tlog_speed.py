@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 PAUSE_US = 60_000_000
 MOST_BYTES = 200_000_000
+LEAST_MB = 50  # of shorter logs the fixed costs are nearly all
 
 
 def main() -> None:
@@ -54,7 +55,7 @@ def main() -> None:
         logs = options.logs or made_logs(Path(folder), sorted(options.megabytes))
         read_log(logs[0])  # compiled now
         rows = [report(path, options.repeats) for path in logs]
-    for (size, seconds, peak), (larger, longer, higher) in pairwise(sorted(rows)):
+    for (size, seconds, peak), (larger, longer, higher) in pairwise(sorted(row for row in rows if row[0] > LEAST_MB)):
         print(
             f"from {size:.0f} to {larger:.0f} MB: {100 * (higher - peak) / (larger - size):.1f} MB of memory and "
             f"{100 * (longer - seconds) / (larger - size):.2f} s for every 100 MB"
