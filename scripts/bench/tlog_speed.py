@@ -1,72 +1,105 @@
 #!/usr/bin/env python3
 """Time our .tlog reader against pymavlink's, side by side in one run, and compare what they find.
 
-    scripts/bench/tlog_speed.py [LOG.tlog ...] [--repeats 5] [--megabytes 100]
+    scripts/bench/tlog_speed.py [LOG.tlog ...] [--repeats 5] [--megabytes 100 400]
 
-Without a log it records a flight of the practice autopilot and repeats it, boot after boot, to 100 MB. Both decode
-the messages that a map needs and pass over the others; pymavlink through `mavlink_connection`. The peak of memory is
-that of a process of its own (Linux).
+Without a log it records a flight of the practice autopilot and repeats it, boot after boot, to each size. Both decode
+the messages that a map needs and pass over the others; pymavlink through `mavlink_connection`, once, and not on logs of
+more than 200 MB, for which it takes minutes. Times are the processor's, so that whatever else runs does not count. The
+peak of memory is that of a process of its own, above what an idle one has (Linux); how it and the time grow from log to
+log is printed last.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import struct
 import sys
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
+from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from stopwatch import fastest
 
 from sparsor.core.mavlink_scan import STAMP
 from sparsor.flightlog import read_log
+from sparsor.flightlog.messages import WANTED, read_messages
 from sparsor.flightlog.opening import LogFile
-from sparsor.flightlog.tlog import WANTED, read_messages
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # the recorded practice flight is the tests'
 from flightlog.recorded import recorded_flight
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+T = TypeVar("T")
 PAUSE_US = 60_000_000
+MOST_BYTES = 200_000_000
+LEAST_MB = 50  # of shorter logs the fixed costs are nearly all
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("logs", nargs="*", type=Path)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--megabytes", type=float, default=100.0, help="of the log that is made")
+    parser.add_argument("--megabytes", type=float, nargs="+", default=[100.0, 400.0], help="of the logs that are made")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        logs = options.logs or [made_log(Path(folder) / "made.tlog", options.megabytes)]
+        logs = options.logs or made_logs(Path(folder), sorted(options.megabytes))
         read_log(logs[0])  # compiled now
-        for path in logs:
-            report(path, options.repeats)
+        rows = [report(path, options.repeats) for path in logs]
+    for (size, seconds, peak), (larger, longer, higher) in pairwise(sorted(row for row in rows if row[0] > LEAST_MB)):
+        print(
+            f"from {size:.0f} to {larger:.0f} MB: {100 * (higher - peak) / (larger - size):.1f} MB of memory and "
+            f"{100 * (longer - seconds) / (larger - size):.2f} s for every 100 MB"
+        )
 
 
-def report(path: Path, repeats: int) -> None:
-    start = time.perf_counter()
-    theirs = pymavlink_count(path)
-    pymavlink_s = time.perf_counter() - start
-    frames_s, ours = fastest(lambda: count(path), repeats)
-    log_s, _ = fastest(lambda: read_log(path), repeats)
+def report(path: Path, repeats: int) -> tuple[float, float, float]:
+    """Print what one log takes; return its megabytes, our seconds and our peak of memory, MB."""
     size = path.stat().st_size
-    print(f"{path.name}: {size / 1e6:.1f} MB, {ours} wanted messages, by pymavlink {theirs}")
-    print(f"  pymavlink            {pymavlink_s:8.3f} s  {size / pymavlink_s / 1e6:8.1f} MB/s")
-    print(
-        f"  our messages         {frames_s:8.3f} s  {size / frames_s / 1e6:8.1f} MB/s  {pymavlink_s / frames_s:6.0f} x"
-    )
-    print(f"  our whole flight log {log_s:8.3f} s  {size / log_s / 1e6:8.1f} MB/s  {pymavlink_s / log_s:6.0f} x")
-    print(f"  our peak of memory   {peak_mb(path):8.0f} MB")
+    frames_s, ours = least_cpu(lambda: count(path), repeats) if size <= MOST_BYTES else (None, None)
+    log_s, _ = least_cpu(lambda: read_log(path), repeats)
+    print(f"{path.name}: {size / 1e6:.1f} MB")
+    if frames_s is not None:
+        pymavlink_s, theirs = least_cpu(lambda: pymavlink_count(path), 1)
+        again_s, _ = least_cpu(lambda: read_log(path), repeats)  # the machine may be busier now than it was before
+        print(f"  wanted messages      {ours}, by pymavlink {theirs}")
+        print(f"  pymavlink            {line(pymavlink_s, size)}")
+        print(f"  our messages         {line(frames_s, size)}  {pymavlink_s / frames_s:6.0f} x")
+        print(f"  our whole flight log {line(log_s, size)}  {pymavlink_s / log_s:6.0f} x")
+        print(f"  the same, afterwards {line(again_s, size)}  {pymavlink_s / again_s:6.0f} x")
+    else:
+        print(f"  our whole flight log {line(log_s, size)}")
+    peak = peak_mb(path)
+    print(f"  our peak of memory   {peak:8.0f} MB")
+    return size / 1e6, log_s, peak
+
+
+def least_cpu(action: Callable[[], T], repeats: int) -> tuple[float, T]:
+    """Return the fewest seconds of the processor that an action took, and its result."""
+    taken_s = []
+    for _ in range(repeats):
+        start = time.process_time()
+        result = action()
+        taken_s.append(time.process_time() - start)
+    return min(taken_s), result
+
+
+def line(seconds: float, size: int) -> str:
+    return f"{seconds:8.3f} s  {size / seconds / 1e6:8.1f} MB/s"
 
 
 def count(path: Path) -> int:
     tables, _ = read_messages(LogFile(path).blocks())
-    return sum(table.records.size for table in tables.values())
+    return sum(table.order.size for table in tables.values())
 
 
 def pymavlink_count(path: Path) -> int:
@@ -92,16 +125,20 @@ def resident_mb(path: Path | None = None) -> float:
     return int(re.search(r"VmHWM:\s*(\d+)", status)[1]) / 1024.0
 
 
-def made_log(path: Path, megabytes: float) -> Path:
+def made_logs(folder: Path, megabytes: list[float]) -> list[Path]:
     """Record a practice flight and repeat it, boot after boot, each later on the recorder's clock."""
-    records = recorded_flight("ardupilot", path.with_suffix(".vehicle")).records
+    records = recorded_flight("ardupilot", folder / "vehicle").records
     (begun_us,), (ended_us,) = (struct.unpack(">Q", records[row][:STAMP]) for row in (0, -1))
-    with path.open("wb") as stream:
-        while stream.tell() < megabytes * 1e6:
-            later_us = stream.tell() // sum(map(len, records)) * (ended_us - begun_us + PAUSE_US)
-            for record in records:
-                stream.write(struct.pack(">Q", struct.unpack(">Q", record[:STAMP])[0] + later_us) + record[STAMP:])
-    return path
+    length = sum(map(len, records))
+    paths = []
+    for size in megabytes:
+        paths.append(folder / f"made-{size:.0f}.tlog")
+        with paths[-1].open("wb") as stream:
+            for boot in range(math.ceil(size * 1e6 / length)):
+                later_us = boot * (ended_us - begun_us + PAUSE_US)
+                for record in records:
+                    stream.write(struct.pack(">Q", struct.unpack(">Q", record[:STAMP])[0] + later_us) + record[STAMP:])
+    return paths
 
 
 if __name__ == "__main__":

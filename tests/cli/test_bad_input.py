@@ -246,3 +246,23 @@ def test_a_scheduler_that_does_not_answer_is_named(console, smooth_field, tree, 
     assert ran.code == 2
     assert "no dask scheduler answers at 'tcp://127.0.0.1:9'" in ran.err
     assert tree() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("send", "--connect", "udpout://127.0.0.1:9"), "say where the values come from"),
+        (("record", "--connect", "nowhere", "-o", "a.tlog"), "nowhere"),
+        (("download", "--connect", "udpout://127.0.0.1:9", "--all", "--list"), "exclude each other"),
+        (("upload", "none", "--connect", "udpout://127.0.0.1:9"), "none"),
+        (("reconstruct", "none.tlog", "--mission", "none"), "'none' does not exist"),
+        (("plan", "none.toml"), "none.toml"),
+        (("inspect", "none.plan"), "none.plan"),
+    ],
+    ids=lambda one: one[0] if isinstance(one, tuple) else "",
+)
+def test_with_json_an_error_is_an_object_on_stdout_too(console, words, said):
+    ran = console("sparsor", *words, "--json")
+    assert ran.code == 2, ran.err
+    assert said in ran.result["error"]
+    assert ran.err == f"error: {ran.result['error']}\n"

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import rasterio
 
+from flightlog.logs import flight as recorded_flight
+from sparsor.flightlog.messages import NAMED_VALUE_FLOAT
 from sparsor.geodesy.lengths import distance_m
 from sparsor.mission import read_plan
 from sparsor.mission.sidecar import read_sidecar, sidecar_npz
@@ -238,6 +240,7 @@ MISTAKES = {
     "a log from elsewhere": (("elsewhere.csv", "--mission", "doha"), "km from its middle"),
     "a log that brushes the box": (("beside.csv", "--mission", "doha"), "give the mission that was flown"),
     "a log without the sensor": (("flight.csv", "--mission", "doha", "--sensor", "CO"), "NO2@1/1"),
+    "a log without any sensor": (("bare.tlog", "--mission", "doha"), "no sensor is in the log, only messages of 1/1"),
     "no such vehicle": (("flight.csv", "--mission", "doha", "--system", 9), "system 9"),
     "an unknown suffix": (("flight.csv", "--mission", "doha", "-o", "map.pdf"), ".tif, .nc, .png, .html, .csv"),
     "over the log": (("flight.csv", "--mission", "doha", "--force", "-o", "flight.csv"), "would be written over"),
@@ -250,6 +253,7 @@ MISTAKES = {
 def test_a_mistake_is_explained_and_nothing_is_written(here, tree, mistake):
     Path("empty").mkdir()
     Path("empty/empty.tlog").touch()
+    Path("bare.tlog").write_bytes(b"".join(one for one in recorded_flight(10).records if one[15] != NAMED_VALUE_FLOAT))
     rows = flight(Path("doha/doha.plan"))
     written(Path("beside.csv"), rows + np.array([0, 0.0299, 0, 0, 0, 0]))
     rows[:, 1] += 1.0

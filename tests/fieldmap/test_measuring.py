@@ -175,7 +175,7 @@ def test_what_makes_no_map_says_why():
         measure(samples, GRID, profile(range=[1000.0, 2000.0]))
     lon, lat = GRID.centres_deg(np.full(100, 77))
     still = replace(samples_at(0, 0, 20 + np.random.default_rng(0).standard_normal(100)), lon_deg=lon, lat_deg=lat)
-    with pytest.raises(DesignError, match=r"1 measurement\(s\) in 1 cell"):
+    with pytest.raises(DesignError, match=r"found: 1 measurement over 1 cell\."):
         measure(still, GRID, profile())
 
 

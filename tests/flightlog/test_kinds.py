@@ -16,8 +16,10 @@ from sparsor.errors import LogError
 from sparsor.flightlog import read_log, read_logs, samples
 from sparsor.flightlog.assembly import assemble
 from sparsor.flightlog.binlog import read_bin
+from sparsor.flightlog.opening import LogFile
 from sparsor.flightlog.table import read_table
 from sparsor.flightlog.ulog import read_ulog
+from sparsor.flightlog.ulogrepair import mended
 
 KINDS = {
     "tlog": (flight().content, None),
@@ -141,11 +143,11 @@ TABLES = {
 @pytest.mark.parametrize("kind", TABLES)
 def test_tables_come_in_many_shapes(kind):
     text = TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z")
-    (values,) = read_table(text.encode()).values
+    (values,) = read_table([text.encode()]).values
     assert values.value.tolist() == [7.5]
     assert values.places is not None
     assert (values.places.lon_deg.tolist(), values.places.lat_deg.tolist()) == ([51.5], [25.3])
-    log = assemble("t.csv", read_table(text.encode()))
+    log = assemble("t.csv", read_table([text.encode()]))
     if "12" in text[-40:] and kind in ("other names", "tabs and milliseconds"):
         assert values.stamp_s.tolist() == [12.25]
     else:
@@ -154,13 +156,13 @@ def test_tables_come_in_many_shapes(kind):
 
 def test_a_missing_value_leaves_out_only_itself():
     text = "time,lon,lat,NO2,O3\n1,51.5,25.3,1,\n2,51.5,25.3,,3\n3,,25.3,4,5\n4,51.5,25.3,6,7\n"
-    recording = read_table(text.encode())
+    recording = read_table([text.encode()])
     assert {values.name: values.value.tolist() for values in recording.values} == {"NO2": [1.0, 6.0], "O3": [3.0, 7.0]}
     assert recording.damage.places == 1
 
 
 def readers(content):
-    for read in (lambda data: read_bin([data], "NO2S.NO2"), read_ulog, read_table):
+    for read in (lambda data: read_bin([data], "NO2S.NO2"), read_ulog, lambda data: read_table([data])):
         yield lambda read=read: assemble("damaged", read(content))
 
 
@@ -194,6 +196,34 @@ def test_the_blocks_of_a_bin_log_never_matter():
     assert one.damage == other.damage
 
 
+@given(st.lists(st.tuples(st.integers(300, 5000), st.integers(0, 60), st.binary(max_size=60)), min_size=1, max_size=4))
+@settings(max_examples=60, deadline=None)
+def test_damage_in_a_px4_log_costs_the_messages_that_it_touches(hurt):
+    content = bytearray(LONG_ULOG)
+    at = len(content)
+    touched = 0
+    for back, cut, inserted in hurt:  # from the end to the definitions
+        at = max(at - back, 1000)
+        content[at : at + cut] = inserted
+        touched += len(inserted) + cut
+    places, skipped = (mended(bytes(content))[number] for number in (2, 1))
+    whole, damaged = read_ulog(LONG_ULOG), read_ulog(bytes(content))
+    for one in whole.values:
+        rest = next(values for values in damaged.values if values.name == one.name)
+        # Beside what a cut touches, the message before it is lost with the head that it led to; what is inserted may
+        # pass for a message of at most half a thousand bytes.
+        lost = one.value.size - rest.value.size
+        assert lost <= len(hurt) * (2 + 512 // 30)
+    assert skipped <= touched + len(hurt) * 2 * 512
+    assert places <= 4 * len(hurt) + touched
+
+
+def test_a_whole_px4_log_and_one_that_breaks_off_are_left_alone():
+    for end in (len(LONG_ULOG), len(LONG_ULOG) - 5, len(LONG_ULOG) // 2):
+        content = LONG_ULOG[:end]
+        assert mended(content)[0] is content
+
+
 def test_a_cut_in_a_bin_log_costs_the_message_it_cuts():
     content = bin_flight(20)
     whole, cut = read_bin([content]), read_bin([content[:3000] + content[3010:]])
@@ -204,15 +234,41 @@ def test_a_cut_in_a_bin_log_costs_the_message_it_cuts():
         assert set(b.value.tolist()) <= set(a.value.tolist())
 
 
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("kind", TABLES)
+def test_the_blocks_of_a_table_never_matter(kind, size):
+    text = TABLES[kind].format(t="12.25", ms="12250", date="2023-11-14T22:13:20Z")
+    content = f'\ufeff{text}no time,"a\nb",\u00b5\n\n'.encode()
+    one, other = read_table([content]), read_table([content[at : at + size] for at in range(0, len(content), size)])
+    assert [v.value.tolist() for v in one.values] == [v.value.tolist() for v in other.values]
+    assert one.damage == other.damage
+
+
+def test_a_log_that_has_to_be_read_at_once_may_not_be_endless(tmp_path):
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(ulog_flight(5))
+    with pytest.raises(LogError, match=r"flight\.ulg' is longer than 0\.0 GB .* give the logs of single flights"):
+        LogFile(path).contents(most=1000)
+    assert LogFile(path).contents() == path.read_bytes()
+
+
+def test_damage_in_a_table_costs_the_rows_that_it_touches():
+    rows = [f"{second},51.5,25.3,40,{second}.5" for second in range(9)]
+    rows[3], rows[5], rows[7] = '3,51.5,"25.3,40,3.5', "5,5\r1.5,25.3,40,5.5", "7,51.5," + "2" * 200_000
+    (values,) = read_table(["\n".join(["time_s,lon,lat,alt,NO2", *rows, ""]).encode()]).values
+    assert values.value.tolist() == [0.5, 1.5, 2.5, 4.5, 6.5, 8.5]
+
+
 @pytest.mark.parametrize("time", ["01.05.2024 12:00:00", "12:00:00", ""])
 def test_a_table_whose_times_nobody_can_read_is_refused(time):
     with pytest.raises(LogError, match="none of its 1 rows has a time and a place"):
-        read_table(f"time,lon,lat,NO2\n{time},51.5,25.3,1\n".encode())
+        read_table([f"time,lon,lat,NO2\n{time},51.5,25.3,1\n".encode()])
 
 
 def test_a_table_without_a_value_is_refused():
     with pytest.raises(LogError, match="no number stands under NO2, O3"):
-        read_table(b"time,lon,lat,NO2,O3\n1,51.5,25.3,nan,\n")
+        read_table([b"time,lon,lat,NO2,O3\n1,51.5,25.3,nan,\n"])
 
 
+LONG_ULOG = ulog_flight(60)
 SHORT_BIN, SHORT_ULOG, SHORT_TABLE = bin_flight(5), ulog_flight(5), table_flight(5)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from flightlog.logs import BOOT_UNIX_S, TlogMaker, flight, v1, v2
 from sparsor.core.mavlink_frames import LONGEST, FrameReader
 from sparsor.flightlog.assembly import assemble
-from sparsor.flightlog.tlog import NAMED_VALUE_FLOAT, WANTED, layout, read_messages, read_tlog
+from sparsor.flightlog.messages import NAMED_VALUE_FLOAT, WANTED, Table, layout, read_messages
+from sparsor.flightlog.tlog import read_tlog
 
 names = st.binary(min_size=1, max_size=10).filter(lambda raw: b"\x00" not in raw)
 
@@ -45,7 +46,7 @@ def test_what_pymavlink_writes_is_read_back(dialect, rows):
     for stamp_ms, name, value in rows:
         maker.named(stamp_ms, 1.0, value, name)
     tables, scanner = read_messages([maker.content])
-    table = tables[NAMED_VALUE_FLOAT]
+    table = tables.get((NAMED_VALUE_FLOAT, 1, 1), Table.empty(NAMED_VALUE_FLOAT))
     assert table.fields["time_boot_ms"].tolist() == [row[0] for row in rows]
     assert table.fields["name"].tolist() == [row[1] for row in rows]
     assert table.fields["value"].tolist() == [row[2] for row in rows]

@@ -6,7 +6,7 @@ import functools
 import json
 import sys
 import traceback
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import IntEnum
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
 
@@ -61,31 +61,53 @@ class Talk(IntEnum):
 
 
 def reporting(command: Callable[P, R]) -> Callable[P, R]:
-    """Turn what a command raises into a sentence on stderr and an exit code; no traceback without -v."""
+    """Turn what a command raises into a sentence on stderr and an exit code; no traceback without -v.
+
+    With --json one object with the key "error" is printed where the result would have been.
+    """
     return reporting_as("interrupted: what was there before is still there")(command)
 
 
-def reporting_as(interrupted: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Do as `reporting` for a command that has its own sentence for a Ctrl-C."""
+def reporting_as(
+    interrupted: str, also: Callable[[BaseException], Mapping[str, object]] = lambda _: {}
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Do as `reporting` for a command with its own sentence for a Ctrl-C, and perhaps more to say of an error.
+
+    Parameters
+    ----------
+    interrupted : str
+    also : callable
+        Given what was raised, returns what stands beside "error" in the JSON object.
+    """
 
     def guard(command: Callable[P, R]) -> Callable[P, R]:
-        return _guarded(command, interrupted)
+        return _guarded(command, interrupted, also)
 
     return guard
 
 
-def _guarded(command: Callable[P, R], interrupted: str) -> Callable[P, R]:
+def _guarded(
+    command: Callable[P, R], interrupted: str, also: Callable[[BaseException], Mapping[str, object]]
+) -> Callable[P, R]:
+    def tell(error: BaseException, words: str, *, as_json: bool) -> None:
+        if as_json:
+            with suppress(OSError):  # what reads the output may be gone: the error may say just that
+                print_json({"error": words, **also(error)})
+
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return command(*args, **kwargs)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
+            tell(error, str(error) or "interrupted", as_json=bool(kwargs.get("as_json")))
             typer.echo(interrupted, err=True)
             raise typer.Exit(INTERRUPTED) from None
         except (SparsorError, OSError, MemoryError) as error:
             if kwargs.get("verbose"):
                 typer.echo(traceback.format_exc(), err=True)
-            typer.echo(f"error: {str(error) or type(error).__name__}", err=True)
+            words = str(error) or type(error).__name__
+            tell(error, words, as_json=bool(kwargs.get("as_json")))
+            typer.echo(f"error: {words}", err=True)
             raise typer.Exit(getattr(error, "exit_code", 1)) from None
 
     return guarded

@@ -9,13 +9,13 @@ import typer
 
 from sparsor.cli.console import Json, Talk, Verbose, print_json, print_table, quiet_option, reporting_as
 from sparsor.cli.flightscreen import FlightScreen, fence_words
-from sparsor.cli.upload import CONNECT_HELP, EnableFence, Sortie, System, Timeout, Yes, telling_the_state
+from sparsor.cli.upload import CONNECT_HELP, EnableFence, Sortie, System, Timeout, Yes, left_with
 
 if TYPE_CHECKING:
     from sparsor.journeys.flying import FlightReport
 
 
-@reporting_as("interrupted: nothing was sent, the vehicle is as it was")
+@reporting_as("interrupted: nothing was sent, the vehicle is as it was", left_with)
 def fly(
     plan: Annotated[Path, typer.Argument(metavar="DIR|FILE.plan", help="A mission folder or any .plan.")],
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
@@ -57,7 +57,7 @@ def fly(
 
     talk = Talk.of(quiet=quiet, verbose=verbose)
     options = FlightOptions(sortie, system, enable_fence, force, timeout, ready_timeout, lost_timeout)
-    with telling_the_state(as_json), FlightScreen(talk, yes=yes) as screen:
+    with FlightScreen(talk, yes=yes) as screen:
         report = fly_mission(plan, connect, output, options, screen)
     if as_json:
         print_json(_contents(report))

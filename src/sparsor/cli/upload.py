@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +12,6 @@ from sparsor.cli.flightscreen import FlightScreen, fence_words
 from sparsor.errors import SparsorError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from sparsor.link.missions.upload import UploadReport
 
 CONNECT_HELP = "Where the vehicle is: udpin://0.0.0.0:14550, tcpout://127.0.0.1:5760, serial:///dev/ttyUSB0:57600 ..."
@@ -31,7 +28,19 @@ Timeout = Annotated[
 ]
 
 
-@reporting_as("interrupted: nothing was sent, the vehicle is as it was")
+def left_with(error: BaseException) -> dict[str, object]:
+    """Return what the vehicle is left with after an error, and the recording if there is one.
+
+    An error of ours that does not say so, and a Ctrl-C that nobody made one of, came before anything was sent.
+    """
+    if not isinstance(error, (SparsorError, KeyboardInterrupt)):
+        return {}
+    recording = getattr(error, "recording", None)
+    state = getattr(error, "vehicle_state", "unchanged")
+    return {"vehicle_state": state, **({} if recording is None else {"tlog": recording})}
+
+
+@reporting_as("interrupted: nothing was sent, the vehicle is as it was", left_with)
 def upload(
     plan: Annotated[Path, typer.Argument(metavar="DIR|FILE.plan", help="A mission folder or any .plan.")],
     connect: Annotated[str, typer.Option("--connect", metavar="URL", help=CONNECT_HELP)],
@@ -58,7 +67,7 @@ def upload(
     from sparsor.journeys.uploading import upload_mission
 
     talk = Talk.of(quiet=quiet, verbose=verbose)
-    with telling_the_state(as_json), FlightScreen(talk, yes=yes or not start) as screen:
+    with FlightScreen(talk, yes=yes or not start) as screen:
         report = upload_mission(
             plan,
             connect,
@@ -81,23 +90,6 @@ def upload(
         typer.echo(report.vehicle_state)
     else:
         print_table(_rows(report), title="Nothing was sent" if dry_run else "Uploaded")
-
-
-@contextmanager
-def telling_the_state(as_json: bool) -> Iterator[None]:
-    """Print one JSON object with the error and what the vehicle is left with, where a result would have been.
-
-    An error that does not say so, and a Ctrl-C that nobody made one of, came before anything was sent.
-    """
-    try:
-        yield
-    except (SparsorError, KeyboardInterrupt) as error:
-        if as_json:
-            state = getattr(error, "vehicle_state", "unchanged")
-            recording = getattr(error, "recording", None)
-            kept = {} if recording is None else {"tlog": recording}
-            print_json({"error": str(error) or "interrupted", "vehicle_state": state, **kept})
-        raise
 
 
 def _contents(report: UploadReport) -> dict[str, object]:

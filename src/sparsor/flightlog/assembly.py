@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,14 +10,14 @@ import numpy as np
 from sparsor.flightlog.clocks import Clock, boots_of
 from sparsor.flightlog.log import Boot, Event, FlightLog, Track
 from sparsor.flightlog.positions import believed_track
-from sparsor.flightlog.recording import Fixes
+from sparsor.flightlog.recording import changes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from sparsor.flightlog.recording import Recording, Ticks
+    from sparsor.flightlog.recording import Fixes, PackedFixes, Recording, Ticks
 
 
 def assemble(name: str, recording: Recording) -> FlightLog:
@@ -27,6 +28,7 @@ def assemble(name: str, recording: Recording) -> FlightLog:
     name : str
         Of the file, for messages.
     recording : Recording
+        Its positions are given away.
     """
     clocks = {system: _clock(ticks) for system, ticks in recording.ticks.items() if ticks.order.size}
     boots = [boot for system, clock in clocks.items() for boot in _boots(system, clock, recording)]
@@ -50,9 +52,9 @@ def _clock(ticks: Ticks) -> Clock:
 
 def _boots(system: int, clock: Clock, recording: Recording) -> Iterator[Boot]:
     tracks: dict[int, list[Track]] = {number: [] for number in range(int(clock.boot[-1]) + 1)}
-    for (owner, message), fixes in recording.fixes.items():
-        if owner == system:
-            for number, track in _tracks(message, fixes, clock):
+    for owner, message in list(recording.fixes):
+        if owner == system:  # and given away: a long log is not held twice
+            for number, track in _tracks(message, recording.fixes.pop((owner, message)), clock):
                 tracks[number].append(track)
     told_s = _told_offsets(system, clock, recording)
     edges = np.searchsorted(clock.boot, range(len(tracks) + 1))  # boots follow each other in a file
@@ -65,15 +67,11 @@ def _boots(system: int, clock: Clock, recording: Recording) -> Iterator[Boot]:
         yield Boot(system, number, float(time_s.min()), float(time_s.max()), offset_s, source, tuple(own))
 
 
-def _tracks(message: str, fixes: Fixes, clock: Clock) -> Iterator[tuple[int, Track]]:
+def _tracks(message: str, fixes: Fixes | PackedFixes, clock: Clock) -> Iterator[tuple[int, Track]]:
     heard_s, boot = clock.at(fixes.order, fixes.received_s)
-    time_s = np.where(np.isnan(fixes.time_s), heard_s, fixes.time_s)
-    for number in np.unique(boot):
-        rows = boot == number
-        own = Fixes(
-            fixes.order[rows], fixes.received_s[rows], time_s[rows], fixes.places.take(rows), fixes.has_fix[rows]
-        )
-        yield int(number), believed_track(message, own, own.time_s)
+    for number, rows in _runs(boot):
+        own = fixes.take(rows)
+        yield number, believed_track(message, own, np.where(np.isnan(own.time_s), heard_s[rows], own.time_s))
 
 
 def _told_offsets(system: int, clock: Clock, recording: Recording) -> dict[int, float]:
@@ -82,7 +80,15 @@ def _told_offsets(system: int, clock: Clock, recording: Recording) -> dict[int, 
     if told is None:
         return {}
     _, boot = clock.at(told.order, np.full(told.order.size, np.nan))
-    return {number: float(np.median(told.offset_s[boot == number])) for number in np.unique(boot).tolist()}
+    return {number: float(np.median(told.offset_s[rows])) for number, rows in _runs(boot)}
+
+
+def _runs(boot: NDArray[np.int64]) -> Iterator[tuple[int, slice | NDArray[np.intp]]]:
+    """Yield every boot and its rows, in their order; boots follow each other, but for a recorder's clock that steps."""
+    ordered = bool((np.diff(boot) >= 0).all())
+    rows = np.arange(boot.size) if ordered else np.argsort(boot, kind="stable")
+    for start, end in pairwise([*changes(boot[rows]).tolist(), boot.size]):
+        yield int(boot[rows[start]]), slice(start, end) if ordered else rows[start:end]
 
 
 def _offset_at_receipt(time_s: NDArray[np.float64], received_s: NDArray[np.float64]) -> tuple[float, str]:

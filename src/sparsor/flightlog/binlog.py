@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sparsor.flightlog.dataflash import Dataflash, Format, Messages
+from sparsor.flightlog.dataflash import Dataflash
 from sparsor.flightlog.log import AMBIENT, AUTOPILOT, Damage, NamedValues, Places, Sender
 from sparsor.flightlog.recording import Fixes, Happening, Recording, Ticks, UnixTimes, changes
-from sparsor.flightlog.texts import text_of
+from sparsor.flightlog.selfdescribed import Format, Messages
+from sparsor.flightlog.texts import rows_by_text, text_of
+from sparsor.flightlog.thinning import APART_S, CLOCK_S, PLACE_DEG, PLACE_M, WHOLE, Course, Rows, ThinnedRows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -37,7 +40,7 @@ _INFO = 6  # the severity of a text, which this log does not keep
 _REACHED = re.compile(r"Reached command #(\d+)")
 
 
-def read_bin(blocks: Iterable[bytes], sensor: str | None = None) -> Recording:
+def read_bin(blocks: Iterable[bytes], sensor: str | None = None, whole: int = WHOLE) -> Recording:
     """Return what a .BIN file holds.
 
     Parameters
@@ -46,15 +49,23 @@ def read_bin(blocks: Iterable[bytes], sensor: str | None = None) -> Recording:
         The file in pieces of any size.
     sensor : str, optional
         A MSG.FIELD to read as well. Those of messages with a position of their own are always read.
+    whole : int
+        So many positions and readings of the clock are kept as they are; of more, see `thinning`.
     """
     asked = sensor.partition(".")[0] if sensor and "." in sensor else None
-    file = Dataflash(blocks, lambda one: one.name in _ALWAYS or one.name == asked or _has_own_place(one))
+
+    def kept_in(one: Format) -> Rows | None:
+        if one.name == "POS" != asked and {"TimeUS", *_PLACE_COLUMNS} <= set(one.numeric()):
+            return _positions(one, whole)
+        return Rows() if one.name in _ALWAYS or one.name == asked or _has_own_place(one) else None
+
+    file = Dataflash(blocks, kept_in)
     messages = file.messages
     system = _system_id(messages.get("PARM"))
     recording = Recording("BIN", fields=tuple(_fields(file)))
     recording.heard = {Sender(system, AUTOPILOT): file.count}
     recording.damage = Damage(file.damaged, file.skipped)
-    recording.ticks[system] = _ticks(messages.values())
+    recording.ticks[system] = _ticks(messages.values(), whole)
     for name in ("POS", "GPS"):
         if name in messages and all(column in messages[name] for column in _PLACE_COLUMNS):
             recording.fixes[system, name] = _fixes(messages[name])
@@ -65,6 +76,19 @@ def read_bin(blocks: Iterable[bytes], sensor: str | None = None) -> Recording:
     for values in recording.values:
         recording.heard.setdefault(values.sender, values.order.size)
     return recording
+
+
+def _positions(one: Format, whole: int) -> ThinnedRows:
+    """Return what collects POS, which a long log has far more often than is of use."""
+    names = [name for name in ("Lng", "Lat", "Alt", "RelHomeAlt") if name in one.numeric()]
+    within = {"Lng": PLACE_DEG, "Lat": PLACE_DEG, "Alt": PLACE_M, "RelHomeAlt": PLACE_M}
+
+    def course(order: NDArray[np.int64], rows: np.ndarray) -> Course:
+        messages = Messages(one, order, rows)
+        across = np.stack([messages.column(name) for name in names], axis=1)
+        return Course(messages.time_s, across, (across[:, :2] == 0).all(axis=1).astype(np.int64))
+
+    return ThinnedRows(course, tuple(within[name] for name in names), APART_S, whole)
 
 
 def _has_own_place(one: Format) -> bool:
@@ -87,12 +111,21 @@ def _system_id(parameters: Messages | None) -> int:
     return 1
 
 
-def _ticks(messages: Iterable[Messages]) -> Ticks:
+def _ticks(messages: Iterable[Messages], whole: int) -> Ticks:
     timed = [one for one in messages if "TimeUS" in one or "TimeMS" in one]
     order = np.concatenate([np.zeros(0, np.int64), *(one.order for one in timed)])
     time_s = np.concatenate([np.zeros(0), *(one.time_s for one in timed)])
     rows = np.argsort(order, kind="stable")
-    return Ticks(order[rows], np.full(rows.size, np.nan), time_s[rows])
+    clock = ThinnedRows(_clock_course, (CLOCK_S,), math.inf, whole)  # between them the number of messages divides time
+    clock.add(order[rows], time_s[rows])
+    columns = clock.joined()
+    if not columns:
+        return Ticks(order, time_s, time_s)
+    return Ticks(columns[0], np.full(columns[0].size, np.nan), columns[1])
+
+
+def _clock_course(order: NDArray[np.int64], time_s: NDArray[np.float64]) -> Course:
+    return Course(order.astype(np.float64), time_s[:, None], np.zeros(order.size, dtype=np.int64))
 
 
 def _fixes(one: Messages) -> Fixes:
@@ -101,7 +134,7 @@ def _fixes(one: Messages) -> Fixes:
         has_fix = one.column("Status") >= _FIX_3D
     if "I" in one:  # the second receiver may stand elsewhere
         has_fix &= one.column("I") == 0
-    return Fixes(one.order, np.full(one.order.size, np.nan), one.time_s, _places(one), has_fix)
+    return Fixes(one.order, np.full(one.order.size, np.nan), one.time_s, _places(one), has_fix, one.stands_for)
 
 
 def _places(one: Messages) -> Places:
@@ -173,17 +206,24 @@ def _named(system: int, messages: dict[str, Messages]) -> Iterator[NamedValues]:
         one = messages.get(kind)
         if one is None or "Name" not in one or "Value" not in one:
             continue
-        names = np.array([text_of(raw) for raw in one.rows["Name"].tolist()])
+        named = sorted(rows_by_text(one.rows["Name"]), key=lambda pair: pair[0])
         size = one.order.size
-        systems = one.column("SSys") if "SSys" in one else np.full(size, system)
-        components = one.column("SCom") if "SCom" in one else np.full(size, AUTOPILOT)
+        senders = _numbers(one, "SSys", system) << 8 | _numbers(one, "SCom", AUTOPILOT)
         stamp_s = one.column("TimeBootMS") / 1e3 if "TimeBootMS" in one else one.time_s
-        for name in np.unique(names).tolist():
-            for who in sorted(set(zip(systems.tolist(), components.tolist(), strict=True))):
-                rows = (names == name) & (systems == who[0]) & (components == who[1])
-                if rows.any():
-                    whole = _column(Sender(int(who[0]), int(who[1])), name, one, stamp_s, one.column("Value"))
-                    yield whole.take(rows)
+        value = one.column("Value")
+        for name, of_name in named:
+            rows = np.arange(size)[of_name]
+            for who in np.unique(senders[rows]).tolist():
+                own = rows[senders[rows] == who]
+                yield _column(Sender(*divmod(who, 256)), name, one, stamp_s, value).take(own)
+
+
+def _numbers(one: Messages, column: str, otherwise: int) -> NDArray[np.int64]:
+    """Return a column of system or component ids; what no id can be is 0."""
+    if column not in one:
+        return np.full(one.order.size, otherwise, dtype=np.int64)
+    values = one.column(column)
+    return np.where((values >= 0) & (values < 256), values, 0).astype(np.int64)
 
 
 def _columns(system: int, messages: dict[str, Messages], sensor: str | None) -> Iterator[NamedValues]:

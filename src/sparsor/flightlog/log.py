@@ -46,7 +46,7 @@ class Places:
     alt_amsl_m: NDArray[np.float64]
     height_m: NDArray[np.float64]
 
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Places:
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Places:
         """Return some of the rows."""
         return Places(self.lon_deg[rows], self.lat_deg[rows], self.alt_amsl_m[rows], self.height_m[rows])
 
@@ -165,7 +165,7 @@ class NamedValues:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Event:
     """Something that happened to a vehicle.
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from sparsor.core.progress import Progress
 
-BLOCK: Final = 4 << 20
+BLOCK: Final = 1 << 20
+MOST_AT_ONCE: Final = 1 << 30
 _GZIP, _XZ = b"\x1f\x8b", b"\xfd7zXZ\x00"
 _BROKEN = (EOFError, gzip.BadGzipFile, lzma.LZMAError, zlib.error)
 
@@ -63,9 +64,25 @@ class LogFile:
         """Return the first bytes."""
         return next(LogFile(self.path).blocks(size), b"")
 
-    def contents(self) -> bytes:
-        """Return all of it, for readers that need it at once."""
-        return b"".join(self.blocks())
+    def contents(self, most: int = MOST_AT_ONCE) -> bytes:
+        """Return all of it, for readers that need it at once.
+
+        Raises
+        ------
+        LogError
+            When it is longer than `most` bytes, or the file cannot be read.
+        """
+        blocks: list[bytes] = []
+        size = 0
+        for block in self.blocks():
+            size += len(block)
+            if size > most:
+                raise LogError(
+                    f"'{self.path}' is longer than {most / 1e9:.1f} GB (unpacked), and a log of this kind is read at "
+                    "once; give the logs of single flights"
+                )
+            blocks.append(block)
+        return b"".join(blocks)
 
     def _unpacked(self, stream: BufferedIOBase, size: int) -> Iterator[bytes]:
         block = bytearray()

@@ -40,8 +40,11 @@ def believed_track(message: str, fixes: Fixes, time_s: NDArray[np.float64]) -> T
     rows = good[first]
     ordered = (time_s[rows], places.lon_deg[rows], places.lat_deg[rows])
     smooth = _reachable(*ordered, _surely_true(*ordered))
+    stands_for = np.ones(zero.size, dtype=np.int32) if fixes.stands_for is None else fixes.stands_for
     dropped = DroppedFixes(
-        zero=int((zero & fixes.has_fix).sum()), no_fix=int((~fixes.has_fix).sum()), jumping=int((~smooth).sum())
+        zero=int(stands_for[zero & fixes.has_fix].sum()),
+        no_fix=int(stands_for[~fixes.has_fix].sum()),
+        jumping=int(stands_for[rows[~smooth]].sum()),
     )
     kept = rows[smooth]
     return Track(message, time_s[kept], places.take(kept), dropped)

@@ -90,7 +90,7 @@ def _recording(file: LogFile, sensor: str | None) -> Recording:
             return read_tlog(file.blocks())
         if kind == "BIN":
             return read_bin(file.blocks(), sensor)
-        return read_ulog(file.contents()) if kind == "ulg" else read_table(file.contents())
+        return read_ulog(file.contents()) if kind == "ulg" else read_table(file.blocks())
     except LogError as error:
         if str(file.path) in str(error):
             raise
@@ -111,7 +111,9 @@ def _kind_of(file: LogFile) -> str:
         return "ulg"
     scanner = TlogScanner(())
     scanner.feed(head, ended=True)
-    messages = Dataflash([head], lambda _: False)
+    if scanner.frames and scanner.skipped < len(head) // 2:  # half of it has right checksums: no need to look further
+        return "tlog"
+    messages = Dataflash([head], lambda _: None)
     # Chance makes a frame of 8 bytes once in millions of bytes of something else, and messages need their FMT first.
     if scanner.frames and scanner.frames >= messages.count:
         return "tlog"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -35,6 +35,9 @@ class Fixes:
         `time_s` is NaN where the message does not tell.
     places : Places
     has_fix : array of bool (n,)
+    stands_for : array of int32 (n,), optional
+        How many messages each row stands for, when not each for itself: those before it that a long log's reader
+        left out, too.
     """
 
     order: NDArray[np.int64]
@@ -42,6 +45,28 @@ class Fixes:
     time_s: NDArray[np.float64]
     places: Places
     has_fix: NDArray[np.bool_]
+    stands_for: NDArray[np.int32] | None = None
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Fixes:
+        """Return some of them."""
+        stands_for = None if self.stands_for is None else self.stands_for[rows]
+        places = self.places.take(rows)
+        return Fixes(self.order[rows], self.received_s[rows], self.time_s[rows], places, self.has_fix[rows], stands_for)
+
+
+class PackedFixes(Protocol):
+    """Positions in fewer bytes than `Fixes` has, which they become row by row."""
+
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """Places in the log."""
+
+    @property
+    def received_s(self) -> NDArray[np.float64]:
+        """Unix time on the recorder's clock."""
+
+    def take(self, rows: NDArray[np.intp] | slice) -> Fixes:
+        """Return some of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +77,7 @@ class UnixTimes:
     offset_s: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Happening:
     """An event at a place in the log; kinds as in `Event`."""
 
@@ -73,7 +98,7 @@ class Recording:
     kind : str
     ticks : dict of int to Ticks
         By system.
-    fixes : dict of (int, str) to Fixes
+    fixes : dict of (int, str) to Fixes, or to what holds them in fewer bytes
         By system and message; the most trusted message first.
     unix : dict of int to UnixTimes
     values : list of NamedValues
@@ -85,7 +110,7 @@ class Recording:
 
     kind: str
     ticks: dict[int, Ticks] = field(default_factory=dict)
-    fixes: dict[tuple[int, str], Fixes] = field(default_factory=dict)
+    fixes: dict[tuple[int, str], Fixes | PackedFixes] = field(default_factory=dict)
     unix: dict[int, UnixTimes] = field(default_factory=dict)
     values: list[NamedValues] = field(default_factory=list)
     happenings: list[Happening] = field(default_factory=list)

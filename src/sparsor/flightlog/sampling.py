@@ -136,8 +136,10 @@ def samples(
     heard_s, boot_of = clock.at(values.order, values.received_s)
     heard = clock.runs_at(values.order, values.received_s, max_gap_s)
     parts: list[_Part] = []
+    by_boot = np.flatnonzero(heard)
+    by_boot = by_boot[np.argsort(boot_of[by_boot], kind="stable")]
     for boot in (one for one in log.boots if one.system == vehicle):
-        rows = np.flatnonzero((boot_of == boot.number) & heard)
+        rows = by_boot[slice(*np.searchsorted(boot_of[by_boot], (boot.number, boot.number + 1)))]
         if rows.size:
             parts.append(_part(values, boot, rows, heard_s[rows], max_gap_s))
     return _together(log, values, vehicle, parts)

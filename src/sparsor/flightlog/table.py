@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
-import io
 import math
 import re
+from array import array
 from datetime import UTC, datetime
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,6 +18,8 @@ from sparsor.flightlog.log import AUTOPILOT, Damage, NamedValues, Places, Sender
 from sparsor.flightlog.recording import Fixes, Recording, Ticks, UnixTimes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from numpy.typing import NDArray
 
 MESSAGE: Final = "CSV"
@@ -31,6 +35,7 @@ _NAMES: Final = {
 _MEANINGS: Final = {name: meaning for meaning, names in _NAMES.items() for name in names.split()}
 _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "usec": 1e-6, "ns": 1e-9, "m": 1.0, "deg": 1.0}
 _NOT_VALUES: Final = frozenset(("clock", "used"))  # of our own samples
+_LONGEST_LINE: Final = 1 << 22
 _VALID_UNIX_S = 946_684_800.0
 _SYSTEM = 1
 _NEEDED = "columns for time, longitude, latitude and a value, such as time_s, lon_deg, lat_deg, alt_m, value"
@@ -45,33 +50,34 @@ def is_table(head: bytes) -> bool:
     )
 
 
-def read_table(contents: bytes) -> Recording:
+def read_table(blocks: Iterable[bytes]) -> Recording:
     """Return what a table holds.
 
     Rows without a place or a time are left out; a value that is missing leaves out only itself.
 
     Parameters
     ----------
-    contents : bytes
-        Text with a header line; columns parted by commas, semicolons or tabs.
+    blocks : iterable of bytes
+        Text with a header line, in pieces of any size; columns parted by commas, semicolons or tabs.
 
     Raises
     ------
     LogError
         When a column that is needed is missing, or no row has a time, a place and a value.
     """
-    header, rows = _cells(contents)
+    rows = _rows(blocks)
+    header = next(rows, [])
     meanings = _meanings(header)
     missing = [what for what in ("time", "lon", "lat") if what not in meanings]
     names = [(place, name) for place, name in enumerate(header) if _is_value(place, name, meanings)]
     if missing or not names:
-        raise LogError(f"its columns are {', '.join(header)}; give {_NEEDED}")
-    numbers = {place: _numbers(rows, place) for place in [*meanings.values(), *(place for place, _ in names)]}
-    time_s = _seconds(rows, meanings["time"], header)
+        raise LogError(f"its columns are {', '.join(header) or 'none'}; give {_NEEDED}")
+    numbers, dates_s = _columns(rows, [*meanings.values(), *(place for place, _ in names)], meanings["time"])
+    time_s = _seconds(numbers[meanings["time"]], dates_s, header[meanings["time"]])
     good = np.isfinite(time_s) & np.isfinite(numbers[meanings["lon"]]) & np.isfinite(numbers[meanings["lat"]])
     if not good.any():
         raise LogError(
-            f"none of its {len(rows)} rows has a time and a place that can be read; give times in seconds or as "
+            f"none of its {good.size} rows has a time and a place that can be read; give times in seconds or as "
             "2024-05-01T12:00:00Z, longitudes and latitudes in degrees"
         )
     if not any(np.isfinite(numbers[place][good]).any() for place, _ in names):
@@ -110,18 +116,56 @@ def _recorded(
     return recording
 
 
-def _cells(contents: bytes) -> tuple[list[str], list[list[str]]]:
-    text = contents.decode("utf-8-sig", "replace").replace("\x00", "")
-    first = text.partition("\n")[0]
+def _lines(blocks: Iterable[bytes]) -> Iterator[str]:
+    decoder = codecs.getincrementaldecoder("utf-8-sig")("replace")
+    rest = ""
+    for block in (*blocks, b""):
+        *lines, rest = (rest + decoder.decode(block, final=not block).replace("\x00", "")).split("\n")
+        yield from (f"{line}\n" for line in lines)
+        if len(rest) > _LONGEST_LINE:
+            raise LogError(f"it is not a table (a line has more than {_LONGEST_LINE} characters); give {_NEEDED}")
+    yield rest
+
+
+def _rows(blocks: Iterable[bytes]) -> Iterator[list[str]]:
+    """Yield the rows that are not empty, the header first; one that cannot be parsed has no cells.
+
+    Only the header may go on in the next line between quotation marks: elsewhere one that damage made would take the
+    rows behind it.
+    """
+    lines = _lines(blocks)
+    first = next(lines)
     delimiter = max(";\t,", key=first.count)
-    decimal_comma = delimiter != ","
     try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=delimiter) if row]
+        header = next((row for row in csv.reader(chain([first], lines), delimiter=delimiter) if row), [])
     except csv.Error as error:
         raise LogError(f"it is not a table ({error}); give {_NEEDED}") from error
-    if decimal_comma:
-        rows = [rows[0], *([cell.replace(",", ".") for cell in row] for row in rows[1:])]
-    return rows[0], rows[1:]
+    yield [cell.strip() for cell in header]
+    for line in lines:
+        text = line.strip("\r\n").replace("\r", " ")
+        if not text:
+            continue
+        try:
+            (row,) = csv.reader([text], delimiter=delimiter)
+        except csv.Error:
+            row = []
+        yield [cell.strip() if delimiter == "," else cell.strip().replace(",", ".") for cell in row]
+
+
+def _columns(
+    rows: Iterable[list[str]], wanted: list[int], time: int
+) -> tuple[dict[int, NDArray[np.float64]], NDArray[np.float64]]:
+    """Return some columns as numbers, and the times as dates if there is no number among them."""
+    numbers = {place: array("d") for place in wanted}
+    dates_s = array("d")
+    no_number = True
+    for row in rows:
+        for place, column in numbers.items():
+            column.append(_number(row[place]) if place < len(row) else math.nan)
+        no_number = no_number and math.isnan(numbers[time][-1])
+        if no_number:
+            dates_s.append(_date_s(row[time]) if time < len(row) else math.nan)
+    return {place: np.array(column) for place, column in numbers.items()}, np.array(dates_s)
 
 
 def _plain(name: str) -> tuple[str, str]:
@@ -145,10 +189,6 @@ def _is_value(place: int, name: str, meanings: dict[str, int]) -> bool:
     return place not in meanings.values() and plain not in _NOT_VALUES and plain not in _MEANINGS and bool(plain)
 
 
-def _numbers(rows: list[list[str]], place: int) -> NDArray[np.float64]:
-    return np.array([_number(row[place]) if place < len(row) else math.nan for row in rows], dtype=np.float64)
-
-
 def _number(cell: str) -> float:
     try:
         value = float(cell)
@@ -157,14 +197,13 @@ def _number(cell: str) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-def _seconds(rows: list[list[str]], place: int, header: list[str]) -> NDArray[np.float64]:
+def _seconds(times: NDArray[np.float64], dates_s: NDArray[np.float64], name: str) -> NDArray[np.float64]:
     """Return the times in seconds: by the unit in the name, else dates, else by their size."""
-    times = _numbers(rows, place)
-    unit = _plain(header[place])[1]
+    unit = _plain(name)[1]
     if unit:
         return times * _UNITS[unit]
     if not np.isfinite(times).any():
-        return np.array([_date_s(row[place]) if place < len(row) else math.nan for row in rows], dtype=np.float64)
+        return dates_s
     typical = float(np.nanmedian(times))
     for limit, scale in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):  # unix time in ns, us, ms
         if typical > limit:

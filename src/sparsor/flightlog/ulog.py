@@ -12,6 +12,7 @@ import numpy as np
 from sparsor.errors import LogError
 from sparsor.flightlog.log import AMBIENT, AUTOPILOT, Damage, NamedValues, Places, Sender
 from sparsor.flightlog.recording import Fixes, Happening, Recording, Ticks, UnixTimes, changes
+from sparsor.flightlog.ulogrepair import mended
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,12 +46,13 @@ def read_ulog(contents: bytes) -> Recording:
     LogError
         When pyulog makes nothing of it.
     """
+    contents, skipped, places = mended(contents)
     file = _parsed(contents)
     recording = Recording("ulg")
     topics = [(one.name, one.data) for one in file.data_list if one.multi_id == 0 and _is_timed(one.data)]
     order = _Orders(topics)
     recording.heard = {Sender(_SYSTEM, AUTOPILOT): sum(data["timestamp"].size for _, data in topics)}
-    recording.damage = Damage(int(file.file_corruption), 0, 0, len(file.dropouts))
+    recording.damage = Damage(max(places, int(file.file_corruption)), skipped, 0, len(file.dropouts))
     recording.ticks[_SYSTEM] = order.ticks
     by_name = dict(reversed(topics))  # the first of a name
     _add_positions(recording, by_name, order)

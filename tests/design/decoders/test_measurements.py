@@ -22,8 +22,8 @@ def test_a_drift_that_fits_no_measurement_is_refused():
     ("weights", "values", "variance", "words"),
     [
         (cells(1, 2), [1.0], [0.0, 0.0], "do not fit"),
-        (cells(1), [1.0], [0.0], r"1 measurement\(s\) in 1 cell\(s\).*at least 2 cells"),
-        (cells(1, 1), [1.0, 2.0], [0.0, 0.0], r"2 measurement\(s\) in 1 cell\(s\)"),
+        (cells(1), [1.0], [0.0], r"at least 2 cells.* found: 1 measurement over 1 cell\."),
+        (cells(1, 1), [1.0, 2.0], [0.0, 0.0], r"found: 2 measurements over 1 cell\."),
         (cells(1, 2), [1.0, np.nan], [0.0, 0.0], "the values hold something that is not a number"),
         (cells(1, 2), [1.0, 2.0], [0.0, np.inf], "the variances hold"),
         (cells(1, 2), [1.0, 2.0], [0.0, -2.0], "noise variance is -2"),

@@ -60,8 +60,9 @@ class Measurements:
             )
         if shape[0] < LEAST_CELLS or self.cells.size < LEAST_CELLS:
             raise DesignError(
-                f"{shape[0]} measurement(s) in {self.cells.size} cell(s): level and amplitude are unknown, so a map "
-                f"needs measurements in at least {LEAST_CELLS} cells"
+                f"a map needs at least {LEAST_CELLS} measurements in at least {LEAST_CELLS} cells, to tell its level "
+                f"and its contrast; found: {_count(shape[0], 'measurement')} over {_count(self.cells.size, 'cell')}. "
+                "Give a log of a longer flight over the box, or all logs of the mission"
             )
         named = {
             "weights": self.weights,
@@ -103,3 +104,7 @@ class Measurements:
         place, second = (np.round(self.weights @ np.sqrt(column * scale), _DIGITS) for scale in (2.0, 3.0 * column))
         order = np.lexsort((self.drift_sd, self.variance, self.values, second, place))
         return Measurements(self.weights[order], self.values[order], self.variance[order], self.drift_sd[order])
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
