@@ -85,7 +85,9 @@ class Cluster:
                         place[self._hand_out(function, shared, part)] = next(order)
                     if not place:
                         return
-                    ready, _ = self._patiently(partial(wait, list(place), return_when="FIRST_COMPLETED"))
+                    # Not in `call`: it sets dask's configuration, which threads would leave behind set.
+                    with self._client.as_current():
+                        ready, _ = self._patiently(partial(wait, list(place), return_when="FIRST_COMPLETED"))
                     for future in ready:
                         finished[place.pop(future)] = pickle.loads(future.result())
                     while due in finished:
@@ -113,8 +115,7 @@ class Cluster:
         """Wait for an answer as long as there are workers; for a while also without, as new ones may be starting."""
         while True:
             try:
-                with self._client.as_current():
-                    return ask(timeout=_PATIENCE_S)
+                return ask(timeout=_PATIENCE_S)
             except TimeoutError:
                 if not self._client.nthreads():
                     raise WorkersLostError(
