@@ -101,12 +101,11 @@ def test_each_greedy_step_is_the_best_gain_for_its_distance():
 
 
 def test_a_prediction_repeats_readings_without_noise_and_follows_the_level(maps):
-    process = GaussianProcess("exponential", 4.0, 1e-10)
     cells = np.array([0, 17, 40, 99])
-    covariance = process.covariance(SHAPE)
-    predicted = process.predict(covariance, cells, maps[:3, cells])
+    covariance = PROCESS.covariance(SHAPE)
+    predicted = PROCESS.predict(covariance, cells, maps[:3, cells], 1e-10)
     np.testing.assert_allclose(predicted[:, cells], maps[:3, cells], atol=1e-6)
-    np.testing.assert_allclose(process.predict(covariance, cells, 5 + maps[:3, cells]), 5 + predicted, atol=1e-9)
+    np.testing.assert_allclose(PROCESS.predict(covariance, cells, 5 + maps[:3, cells], 1e-10), 5 + predicted, atol=1e-9)
 
 
 def test_a_budget_too_small_or_of_time_is_refused_in_words(maps):
