@@ -1,187 +1,275 @@
 #!/usr/bin/env python3
-"""The refined search against a lawnmower and a tour of QR pivots, by the blocked protocol.
+"""The refined search against every baseline, by the blocked protocol: one row a route, a fold a column.
 
-Every cell under a route is measured, with sensor noise of the sd given; every route is decoded by the blend of
-method's linear decoders (training covariance with its symmetries, and an exponential kernel; level unknown) whose
-share, decay, nugget and covariance are chosen on the validation maps. The routes are searched with the training maps'
-covariance alone; for the test maps the covariance is learned again from training and validation maps. Printed: the mean
-over the test maps of each fold, and over the folds; |s - s'| / |s| for smooth fields, --squared |s - s'|^2.
+Every route is decoded twice, with all cells under its legs measured and with its stops alone, by the blend of method's
+linear decoders; its settings are chosen on the validation maps, and for the test maps, which are decoded once, the
+covariance is learned again from training and validation maps. Algorithm 1 is also decoded from its 35 sums by the
+LASSO, as the paper does, within the budgets and at its own p = 0.03, theta = 3. Printed: the mean over the test maps of
+each fold, and over the folds: |s - s'| / |s| for smooth fields, with --squared |s - s'|^2; length in cell units;
+seconds that the planning took.
 
     scripts/bench/refined.py gulf_no2_omi_2020-09.tif
     scripts/bench/refined.py wide_no2_omi_2020-09.nc --native --squared
     scripts/bench/refined.py FIELD --quick                      one fold, few moves
+    scripts/bench/refined.py FIELD --t90 30                     a slow sensor over a 3 km box at 10 m/s, beside t90 = 0
+    scripts/bench/refined.py FIELD --sgptools-python /path/to/python    SGP-Tools and PySensors run there
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import subprocess
+import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from sparsor.core.metrics import relative_error, squared_error
 from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
-from sparsor.design import Budget, unit_legs
-from sparsor.design.decoders.covariance import contrasts, kernel_covariance, with_symmetries
-from sparsor.design.refined import DEFAULT_ITERATIONS, Sensor, Task, refine
+from sparsor.design import Budget, Problem, Weights, fixed_sparsity, search, shortest_path, unit_legs
+from sparsor.design.refined import DEFAULT_ITERATIONS, refine
 from sparsor.design.refined.costs import costs
-from sparsor.design.refined.posterior import belief
-from sparsor.design.refined.starts import pivots, tour_within
+from sparsor.design.refined.starts import tour_within
+from sparsor.design.tuning import choose_lasso_weight
 from sparsor.prior.reading import read_field
-from sparsor.prior.statistics import Kernel, shape_covariance
-from sparsor.study import blocked_split, scaled, study_maps
-from sparsor.study.protocol import BLOCKED_FOLDS, PAPER_PIXELS, dense_maps
+from sparsor.study import study_maps
+from sparsor.study.baselines import best_within, lawnmower, qr_pivot_tour, random_tour, tuned_ipp
+from sparsor.study.cases import blocked_case
+from sparsor.study.decoding import decode_lasso, decode_linear, validation_error
+from sparsor.study.observing import flown_at, of_cells, readings, task_of
+from sparsor.study.protocol import BLOCKED_FOLDS, PAPER_PIXELS
 
 SHAPE = (32, 32)
-LEGS = unit_legs(SHAPE)
-ALL = np.ones(LEGS.size, dtype=bool)
 BUDGETS, NOISES = (102, 200, 274), (0.0, 0.01)
-SHARES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 1.0)
-DECAYS = (1.5, 3.0, 6.0, 12.0, 24.0, 96.0)
-NUGGETS = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2)
-LEAST_NOISE = 3e-5  # of the maps' variance: what keeps a search without noise from trusting details of the covariance
+ATOMS, ROWS, PROBABILITY, THETA = 256, 35, 0.03, 3
+# The example of the packaged quadrotor: 3 km box, 10 m/s.
+LEGS = flown_at(unit_legs(SHAPE), 3000.0 / SHAPE[0] / 10.0)
+PEERS = Path(__file__).with_name("peers.py")
+# Of method's measured references, for where SGP-Tools is not installed: Gulf relative, wide squared errors.
+QUOTED = {
+    (0.0, False): {102: 0.072, 200: 0.017, 274: 0.008},
+    (0.01, False): {102: 0.113, 200: 0.071, 274: 0.058},
+    (0.0, True): {102: 1.463, 200: 0.754, 274: 0.497},
+    (0.01, True): {102: 1.50, 200: 0.80, 274: 0.55},
+}
 
 
-@dataclass(frozen=True)
+class Planned(NamedTuple):
+    """A route, what it took to plan it, and Algorithm 1's measurement matrix."""
+
+    stops: np.ndarray
+    seconds: float
+    phi: np.ndarray | None = None
+
+
 class Fold:
-    """Maps of a fold, and covariances of the training maps and of training and validation maps together."""
+    """One fold, and the routes over it that do not depend on the sensor's noise."""
 
-    sets: object
-    training: dict
-    both: dict
+    def __init__(self, case, options) -> None:
+        self.case, self.options = case, options
 
-    @classmethod
-    def of(cls, maps, field, pixels, number):
-        """Return one of the blocked folds."""
-        sets = scaled(maps, blocked_split(maps, number))
-        both = np.concatenate([sets.training, sets.validation])
-        training, final = (dense_maps(field, number, pixels, validation=more) for more in (False, True))
-        return cls(sets, covariances(sets.training, training), covariances(both, final))
+    @cache  # noqa: B019 # a few folds live as long as the program
+    def psi(self):
+        """Return the learned dictionary."""
+        return self.case.dictionary(ATOMS, self.options.seed)
 
+    @cache  # noqa: B019
+    def problem(self):
+        """Return what Algorithm 1 is given, without a budget."""
+        maps = self.case.sets.validation - self.case.mean
+        weight = choose_lasso_weight(self.psi(), maps, LEGS, rows=ROWS, seed=self.options.seed)
+        return Problem(self.psi(), maps, weight, LEGS, ROWS)
 
-def covariances(maps, dense):
-    """Return the covariance of shapes of densely laid windows, and of the maps as they are."""
-    off = maps - maps.mean(axis=0)
-    return {
-        "scale-free": contrasts(with_symmetries(shape_covariance(dense), SHAPE), ALL),
-        "plain": contrasts(with_symmetries(off.T @ off, SHAPE), ALL),
-    }
-
-
-KERNELS = {decay: kernel_covariance(SHAPE, Kernel(1.0, decay, 0.0), ALL) for decay in DECAYS}
-
-
-def decode(covariance, cells, values, nugget):
-    """Return the maps (n, N) by universal kriging with unknown level; None when the system is singular."""
-    try:
-        factor = cho_factor(covariance[np.ix_(cells, cells)] + nugget * np.eye(cells.size), lower=True)
-    except LinAlgError:
-        return None
-    solved = cho_solve(factor, np.column_stack([values.T, np.ones(cells.size)]))
-    ones = solved[:, -1]
-    level = solved[:, :-1].sum(axis=0) / ones.sum()
-    return (level + covariance[:, cells] @ (solved[:, :-1] - np.outer(ones, level))).T
+    @cache  # noqa: B019
+    def route(self, name, limit, sd, t90_s) -> Planned:
+        """Return a route, timed; `sd` and `t90_s` are 0 for planners that do not look at them."""
+        if name in ALGORITHM:
+            self.problem()  # learned before, as for a real flight
+        begun = time.perf_counter()
+        with one_blas_thread():
+            found = PLANNERS[name](self, Budget(float(limit), "distance"), sd, t90_s)
+        seconds = time.perf_counter() - begun
+        return Planned(found, seconds) if isinstance(found, np.ndarray) else Planned(found.stops, seconds, found.phi)
 
 
-def test_error(fold, stops, sd, metric):
-    """Choose the blend on the validation maps and return its mean error on the test maps."""
-    cells = LEGS.cells_under(stops)
-    truth = fold.sets.validation
-    values = truth[:, cells] + sd * stream(0, 8).standard_normal((len(truth), cells.size))
-    known = {}
-
-    def mixed(part, share, decay):
-        return share * part + (1 - share) * KERNELS[decay]
-
-    def error(choice):
-        if choice not in known:
-            share, decay, nugget, name = choice
-            decoded = decode(mixed(fold.training[name], share, decay), cells, values, nugget)
-            known[choice] = np.inf if decoded is None else metric(truth, decoded).mean()
-        return known[choice]
-
-    best, before = (0.5, 12.0, 1e-4, "scale-free"), None
-    while best != before:
-        before = best
-        for place, options in enumerate((SHARES, DECAYS, NUGGETS, tuple(fold.training))):
-            best = min([best, *((*best[:place], one, *best[place + 1 :]) for one in options)], key=error)
-    share, decay, nugget, name = best
-    truth = fold.sets.test
-    values = truth[:, cells] + sd * stream(0, 9).standard_normal((len(truth), cells.size))
-    return metric(truth, decode(mixed(fold.both[name], share, decay), cells, values, nugget)).mean()
+def algorithm_1(fold, budget, _sd, _t90_s):
+    problem = replace(fold.problem(), budget=budget)
+    return best_within(problem, seed=fold.options.seed, iterations=fold.options.samples, workers=fold.options.workers)
 
 
-def lawnmower(task, _options):
-    """Return the most lines that the budget allows, half a spacing away from every side."""
-    best = None
-    for lines in range(1, SHAPE[0] + 1):
-        spacing = SHAPE[0] / lines
-        row = ((np.arange(lines) + 0.5) * spacing).astype(int)
-        inset = int(spacing / 2)
-        ends = [np.array([inset, SHAPE[1] - 1 - inset])[:: 1 if k % 2 == 0 else -1] for k in range(lines)]
-        stops = np.concatenate([at * SHAPE[1] + end for at, end in zip(row, ends, strict=True)])
-        if LEGS.path_length(stops) <= task.budget.limit:
-            best = stops
-    return best
+def papers_own(fold, _budget, _sd, _t90_s):
+    problem = replace(fold.problem(), improve=False)
+    sparsity = fixed_sparsity(PROBABILITY, THETA)
+    options = {"seed": fold.options.seed, "iterations": fold.options.samples, "workers": fold.options.workers}
+    return search(problem, sparsity, Weights(), **options)
 
 
-def qr_pivots(task, _options):
-    with one_blas_thread():
-        prior = belief(task.covariance, ALL, rank=128, least=task.least_telling)
-        return tour_within(pivots(prior, task.sensor.noise), costs(task.budget, LEGS))
-
-
-def refined(task, options):
+def refined(fold, budget, sd, t90_s):
+    task = task_of(fold.case, LEGS, budget.limit, sd=sd, t90_s=t90_s)
+    options = fold.options
     return refine(task, seed=options.seed, iterations=options.iterations, workers=options.workers).stops
 
 
+PAPERS = f"Algorithm 1, p = {PROBABILITY}, theta = {THETA}"
+ALGORITHM = ("Algorithm 1", PAPERS)
+PLANNERS = {
+    "lawnmower": lambda _fold, budget, *_: lawnmower(LEGS, budget),
+    "random cells": lambda fold, budget, *_: random_tour(LEGS, budget, stream(fold.options.seed, 11)),
+    "QR pivots": lambda fold, budget, *_: qr_pivot_tour(fold.case.sets.training, LEGS, budget),
+    "greedy IPP": lambda fold, budget, *_: tuned_ipp(fold.case.sets.validation, LEGS, budget)[0],
+    "Algorithm 1": algorithm_1,
+    "refined": refined,
+    PAPERS: papers_own,
+}
+
+
 def main() -> None:
+    options = arguments()
+    metric = squared_error if options.squared else relative_error
+    field, pixels = read_field(options.field), None if options.native else PAPER_PIXELS
+    maps = study_maps(field, pixels)
+    numbers = range(1 if options.quick else len(BLOCKED_FOLDS))
+    folds = [Fold(blocked_case(maps, field, number, pixels), options) for number in numbers]
+    print(
+        f"{options.field.name}: {len(maps.maps)} maps, {maps.dropped} dropped, {maps.filled} filled; {metric.__name__}"
+    )
+    print("| noise | t90, s | budget | route | measured | decoder |", end="")
+    print(" | ".join(f" fold {k}" for k in range(len(folds))) + " | mean | length | s |")
+    print("|---" * (len(folds) + 9) + "|")
+    peers = [peer_routes(fold, options) for fold in folds] if options.sgptools_python else []
+    for sd in NOISES:
+        for t90_s in sorted({0.0, options.t90}):
+            for limit in BUDGETS:
+                for name in options.routes:
+                    if name != PAPERS:
+                        report(name, folds, limit, sd, t90_s, metric)
+                for name in sorted({key[0] for key in peers[0] if key[1] == limit} if peers else ()):
+                    report_peer(name, folds, peers, limit, sd, t90_s, metric)
+                if not peers and t90_s == 0:
+                    print(quoted(limit, sd, options.squared))
+            if PAPERS in options.routes:
+                report(PAPERS, folds, None, sd, t90_s, metric)
+
+
+def report(name, folds, limit, sd, t90_s, metric) -> None:
+    answers = name == "refined"
+    routes = [fold.route(name, limit or 0.0, sd if answers else 0.0, t90_s if answers else 0.0) for fold in folds]
+    row = (sd, t90_s, limit or "none", name)
+    for measured in ("legs", "stops"):
+        errors = [
+            blend_error(fold, one.stops, measured, sd, t90_s, metric) for fold, one in zip(folds, routes, strict=True)
+        ]
+        print_row(*row, measured, "blend", errors, routes)
+    if name in ALGORITHM and t90_s == 0:
+        errors = [sums_error(fold, one, sd, metric) for fold, one in zip(folds, routes, strict=True)]
+        print_row(*row, f"{ROWS} sums", "lasso", errors, routes)
+
+
+def blend_errors(folds, routes, *asked):
+    return [blend_error(fold, one.stops, *asked) for fold, one in zip(folds, routes, strict=True)]
+
+
+def blend_error(fold, stops, measured, sd, t90_s, metric):
+    with one_blas_thread():
+        decoded = decode_linear(fold.case, readings(LEGS, stops, measured, sd=sd, t90_s=t90_s), "blend", metric)
+    return float(metric(fold.case.sets.test, decoded).mean())
+
+
+def sums_error(fold, planned, sd, metric):
+    cells = np.unique(planned.stops)
+    made = of_cells(cells, LEGS.size, sd)
+    decoded = decode_lasso(fold.case, made, fold.psi(), sums=planned.phi[:, cells], metric=metric)
+    return float(metric(fold.case.sets.test, decoded).mean())
+
+
+def print_row(sd, t90_s, limit, name, measured, decoder, errors, routes) -> None:
+    length = np.mean([LEGS.path_length(one.stops) for one in routes])
+    print(
+        f"| {sd:g} | {t90_s:g} | {limit} | {name} | {measured} | {decoder} | "
+        f"{' | '.join(f'{one:.4f}' for one in errors)} | {np.mean(errors):.4f} | {length:.0f} | "
+        f"{np.mean([one.seconds for one in routes]):.1f} |",
+        flush=True,
+    )
+
+
+def quoted(limit, sd, squared) -> str:
+    name = "SGP-Tools' best route (quoted from method.md: not run here)"
+    return f"| {sd:g} | 0 | {limit} | {name} | legs | blend | {QUOTED[sd, squared][limit]:g} (mean of 3 folds) |"
+
+
+def peer_routes(fold, options):
+    """Return the routes of other planners over a fold: by planner and budget, of all kinds that fit it."""
+    with tempfile.TemporaryDirectory() as folder:
+        given, found = Path(folder) / "given.npz", Path(folder) / "found.npz"
+        maps = fold.case.sets.training
+        np.savez(given, maps=maps, shape=SHAPE, limits=np.array(BUDGETS, float), steps=options.peer_steps)
+        subprocess.run([options.sgptools_python, PEERS, given, found], check=True, stderr=subprocess.DEVNULL)
+        answers = dict(np.load(found))
+    routes = {}
+    for key in (one for one in answers if not one.endswith("|seconds")):
+        name, limit, kind = key.split("|")
+        stops = within(answers[key], kind, Budget(float(limit), "distance"))
+        if stops is not None:
+            routes.setdefault((name, float(limit)), []).append(Planned(stops, float(answers[f"{key}|seconds"])))
+    return routes
+
+
+def within(cells, kind, budget):
+    """Return a peer's cells as a route, or nothing when it is too long: our 2-opt orders them where that is shorter."""
+    if kind == "ranking":
+        return tour_within(cells, costs(budget, LEGS))
+    tour = min([cells, shortest_path(cells, LEGS.length)], key=LEGS.path_length)
+    return tour if tour.size > 1 and budget.used(tour, LEGS) <= budget.limit else None
+
+
+def report_peer(name, folds, peers, limit, sd, t90_s, metric) -> None:
+    """Print the kind, of kernel and number of stops, that the validation maps choose for each fold."""
+    if not all((name, limit) in of for of in peers):
+        print(f"| {sd:g} | {t90_s:g} | {limit} | {name} | no route of its own within the budget in some fold |")
+        return
+    for measured in ("legs", "stops"):
+        routes = [
+            best_kind(fold, of[name, limit], measured, sd, t90_s, metric) for fold, of in zip(folds, peers, strict=True)
+        ]
+        errors = [
+            blend_error(fold, one.stops, measured, sd, t90_s, metric) for fold, one in zip(folds, routes, strict=True)
+        ]
+        print_row(sd, t90_s, limit, name, measured, "blend", errors, routes)
+
+
+def best_kind(fold, kinds, measured, sd, t90_s, metric):
+    def error(one):
+        with one_blas_thread():
+            made = readings(LEGS, one.stops, measured, sd=sd, t90_s=t90_s)
+            return validation_error(fold.case, made, "blend", metric)
+
+    return min(kinds, key=error)
+
+
+def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("field", type=Path)
     parser.add_argument("--native", action="store_true", help="keep the native pixels (else 1390 x 994)")
     parser.add_argument("--squared", action="store_true", help="print squared errors")
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--iterations", type=int, default=DEFAULT_ITERATIONS)
+    parser.add_argument("--t90", type=float, default=0.0, help="also a sensor of this response, s")
+    parser.add_argument("--routes", nargs="+", default=list(PLANNERS), choices=list(PLANNERS))
+    parser.add_argument("--iterations", type=int, default=DEFAULT_ITERATIONS, help="moves of the refined search")
+    parser.add_argument("--samples", type=int, default=500, help="of Algorithm 1")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--sgptools-python", metavar="PATH", help="a Python that has sgptools or python-sensors")
+    parser.add_argument("--peer-steps", type=int, default=100, help="of SGP-Tools' optimiser")
     options = parser.parse_args()
     if options.quick:
-        options.iterations = min(options.iterations, 20_000)
-    field, pixels = read_field(options.field), None if options.native else PAPER_PIXELS
-    maps = study_maps(field, pixels)
-    folds = [Fold.of(maps, field, pixels, number) for number in range(1 if options.quick else len(BLOCKED_FOLDS))]
-    metric = squared_error if options.squared else relative_error
-    print(
-        f"{options.field.name}: {len(maps.maps)} maps, {maps.dropped} dropped, {maps.filled} filled; {metric.__name__}"
-    )
-    print("| noise | budget | route | " + " | ".join(f"fold {k}" for k in range(len(folds))) + " | mean | length | s |")
-    print("|---" * (len(folds) + 6) + "|")
-    for sd in NOISES:
-        for limit in BUDGETS:
-            for planner in (lawnmower, qr_pivots, refined):
-                report(planner, folds, limit, sd, metric, options)
-
-
-def report(planner, folds, limit, sd, metric, options) -> None:
-    errors, lengths, seconds = [], [], []
-    for fold in folds:
-        noise = LEAST_NOISE + sd**2 / fold.sets.training.var(axis=1).mean()
-        task = Task(fold.training["scale-free"], LEGS, Budget(float(limit), "distance"), Sensor(noise))
-        start = time.perf_counter()
-        stops = planner(task, options)
-        seconds.append(time.perf_counter() - start)
-        lengths.append(LEGS.path_length(stops))
-        errors.append(test_error(fold, stops, sd, metric))
-    print(
-        f"| {sd:g} | {limit} | {planner.__name__} | {' | '.join(f'{one:.4f}' for one in errors)} | "
-        f"{np.mean(errors):.4f} | {np.mean(lengths):.0f} | {np.mean(seconds):.1f} |",
-        flush=True,
-    )
+        options.iterations, options.samples = min(options.iterations, 20_000), min(options.samples, 60)
+    return options
 
 
 if __name__ == "__main__":

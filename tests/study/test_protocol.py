@@ -87,7 +87,9 @@ def test_the_random_split_is_disjoint_complete_and_of_the_papers_shares(maps, se
 
 @pytest.mark.parametrize("count", [1, 2, 7, 19, 60, 1120])
 def test_the_random_split_of_any_number_of_maps_is_disjoint_and_complete(maps, count):
-    fewer = replace(maps, maps=maps.maps[:count], row=maps.row[:count], column=maps.column[:count])
+    fewer = replace(
+        maps, maps=maps.maps[:count], row=maps.row[:count], column=maps.column[:count], west=maps.west[:count]
+    )
     split = random_split(fewer, 4)
     together = np.concatenate([split.training, split.validation, split.test])
     np.testing.assert_array_equal(np.sort(together), np.arange(count))
@@ -140,7 +142,7 @@ def test_the_random_split_does_share_pixels(places):
 def test_maps_left_out_for_gaps_leave_the_other_maps_in_their_sets(maps):
     whole = blocked_split(maps, 1)
     kept = np.random.default_rng(1).random(1120) < 0.9
-    fewer = replace(maps, maps=maps.maps[kept], row=maps.row[kept], column=maps.column[kept])
+    fewer = replace(maps, maps=maps.maps[kept], row=maps.row[kept], column=maps.column[kept], west=maps.west[kept])
     split = blocked_split(fewer, 1)
     for part in ("training", "validation", "test"):
         members = np.zeros(1120, dtype=bool)
@@ -187,7 +189,9 @@ def test_a_fold_that_is_not_there_is_said_so(maps, fold):
 
 def test_the_blocked_protocol_is_for_the_papers_columns_only(maps):
     narrow = maps.column < 20
-    fewer = replace(maps, maps=maps.maps[narrow], row=maps.row[narrow], column=maps.column[narrow])
+    fewer = replace(
+        maps, maps=maps.maps[narrow], row=maps.row[narrow], column=maps.column[narrow], west=maps.west[narrow]
+    )
     with pytest.raises(InputError, match=r"made for the 40 window columns of a raster of 1390 pixels; there are 20"):
         blocked_split(fewer, 0)
 
