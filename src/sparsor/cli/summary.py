@@ -18,7 +18,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "plans": [str(folder / f"{spec.name}.plan")],
         "sidecar": str(folder / f"{spec.name}.npz"),
         "stops": int(found.stops.size),
-        "cells_measured": int(found.stops.size),
+        "cells_measured": int(found.phi.any(axis=0).sum()),
         "cells_flown_over": mission.cells_flown_over,
         "path_length_m": mission.path_length_m,
         "flown_length_m": mission.flown_length_m,
@@ -51,7 +51,7 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             "box",
             f"{box.east_m / 1000:.4g} km east-west, {box.north_m / 1000:.4g} km north-south, {rows} x {columns} cells",
         ),
-        ("stops", f"{found.stops.size} cells measured, {mission.cells_flown_over} flown over"),
+        ("stops", _stops(mission)),
         (
             "distance",
             f"{mission.path_length_m / 1000:.2f} km over the stops, {mission.coverage_fraction:.1%} of full coverage "
@@ -95,6 +95,15 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             ),
         ]
     return table
+
+
+def _stops(mission: PlannedMission) -> str:
+    stops, over = mission.candidate.stops.size, mission.cells_flown_over
+    if mission.candidate.dwells is None:
+        return f"{stops} cells measured, {over} flown over"
+    holds_s = [stop.hold_s for stop in mission.plan.stops if stop.hold_s > 0]
+    dwells = f"; {sum(holds_s):g} s of dwelling at {len(holds_s)} of them" if holds_s else ", none dwelt at"
+    return f"{stops} turning points{dwells}; {over} cells flown over and measured"
 
 
 def curve_table(

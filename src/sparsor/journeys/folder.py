@@ -10,7 +10,6 @@ from sparsor.errors import MissionError
 from sparsor.mission import export_bytes, plan_bytes
 from sparsor.mission.sidecar import Sidecar, content_hash, sidecar_npz
 from sparsor.mission.specification import read_specification, specification_toml
-from sparsor.vehicle import autopilot_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -122,7 +121,7 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         phi=candidate.phi,
         stops=candidate.stops,
         altitude_m=flight.altitude_m,
-        hold_s=autopilot_named(flight.autopilot).written_hold_s(flight.hold_s),
+        hold_s=max(stop.hold_s for stop in plan.stops),
         home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
         home_altitude_known=plan.home.altitude_known,
         lasso_weight=mission.specification.search.lasso or mission.prior.model.lasso_weight,

@@ -128,6 +128,12 @@ def _model(model: Model, path: Path) -> Inspection:
     return Inspection("model", _model_contents(model), (f"{path}: a model", *_model_lines(model)))
 
 
+def _holds(sidecar: Sidecar) -> str:
+    # Where every row of Phi is a cell flown over, the search chose where to dwell, and a stop may be flown through.
+    each = "at most" if (sidecar.phi.sum(axis=1) == 1).all() else "each"
+    return f"{sidecar.hold_s:g} s {each}"
+
+
 def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
     box = sidecar.grid.box
     known = "" if sidecar.home_altitude_known else " (unknown, written as 0)"
@@ -135,10 +141,9 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         f"{path}: the sidecar of mission '{sidecar.name}'",
         f"Box: {' '.join(f'{side:g}' for side in box.as_tuple())} (west south east north), "
         f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside.",
-        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {sidecar.hold_s:g} s each.",
+        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {_holds(sidecar)}.",
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
-        f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast "
-        "(|s - s'| / |s - mean(s)|, from the sums).",
+        f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast (|s - s'| / |s - mean(s)|).",
         *(() if sidecar.sensor is None else (f"Sensor: {sidecar.sensor.words}.",)),
         *_model_lines(sidecar.model),
     )

@@ -41,7 +41,7 @@ class Sidecar:
     stops : array of int64 (n,)
         Planned cells in flight order.
     altitude_m, hold_s : float
-        Height above home and dwell time at each stop.
+        Height above home and the longest dwell time at a stop.
     home : tuple of float
         Longitude, latitude (degrees) and altitude above mean sea level (m) of home.
     home_altitude_known : bool

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from _thread import interrupt_main
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from threading import Event
 
 import numpy as np
@@ -15,9 +15,10 @@ from sparsor.design import Budget, unit_legs
 from sparsor.design.decoders.covariance import kernel_covariance
 from sparsor.design.refined import Sensor, Task, refine
 from sparsor.design.refined.annealing import route_error
-from sparsor.design.refined.costs import costs, used
+from sparsor.design.refined.costs import costs, shortest_pair, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.flyover import flyover
+from sparsor.design.refined.inducing import inducing_tour, placed
 from sparsor.design.refined.posterior import belief
 from sparsor.design.refined.starts import most_telling, pivots, starts, tour_within
 from sparsor.errors import BudgetError, DesignError
@@ -175,6 +176,47 @@ def test_rankings_name_each_cell_once():
     for ranking in (pivots(prior, 1e-3), most_telling(prior, 1e-3)):
         assert np.unique(ranking).size == ranking.size == 21
         assert LEGS.path_length(tour_within(ranking, costs(Budget(LIMIT, "distance"), LEGS))) <= LIMIT
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_inducing_points_go_where_they_tell_more(seed):
+    prior = belief(task().covariance, ALL, rank=40)
+    begin = np.random.default_rng(seed).choice(LEGS.size, 8, replace=False)
+
+    def error(cells):
+        return route_error_of(prior, cells)
+
+    found = placed(prior, SHAPE, 1e-3, begin)
+    assert error(found) < error(begin)
+    assert error(placed(prior, SHAPE, 1e-3, found)) < 1.05 * error(found)  # it is a resting place, but for rounding
+
+
+def route_error_of(prior, cells):
+    """Expected error with single readings of some cells, whatever the way between them."""
+    rows = prior.factor[cells]
+    information = np.diag(1 / prior.spread) + rows.T @ (rows / (prior.residual[cells, None] + 1e-3))
+    return np.linalg.inv(information).diagonal() @ prior.size
+
+
+def test_a_tour_of_inducing_points_keeps_the_budget_and_stays_inside():
+    allowed = ALL.reshape(SHAPE).copy()
+    allowed[:, 7:] = False
+    legs = replace(LEGS, allowed=allowed.ravel()).kept_inside()
+    one = task(legs)
+    prior = belief(one.covariance, legs.allowed, rank=40)
+    spent = costs(one.budget, legs)
+    tour = inducing_tour(prior, spent, SHAPE, 1e-3, most_telling(prior, 1e-3))
+    assert tour.size > 4
+    assert used(spent, tour) <= LIMIT
+    assert legs.allowed[tour].all()
+
+
+def test_the_shortest_pair_is_the_cheapest_of_all():
+    legs = blown(0.3)
+    spent = costs(Budget(99.0, "time", home=np.arange(LEGS.size) * 0.01), legs)
+    pair = shortest_pair(spent, ALL)
+    every = [used(spent, np.array(both)) for both in product(range(LEGS.size), repeat=2) if both[0] != both[1]]
+    assert used(spent, pair) == pytest.approx(min(every))
 
 
 def test_what_cannot_be_searched_is_refused():
