@@ -75,7 +75,7 @@ def test_field_to_plan_to_map(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     told = run(
         monkeypatch, capsys, "--bbox", *BOX, "--field", field_file(tmp_path), "--budget", "15%",
-        "--iterations", 100, "--name", "hills", "--json",
+        "--planner", "monte-carlo", "--iterations", 100, "--name", "hills", "--json",
     )  # fmt: skip
 
     # What a vehicle does: it measures where the plan says.

@@ -58,7 +58,7 @@ def made(tmp_path_factory, cache):
     asked = {
         "name": "doha",
         "area": {"bbox": (51.50, 25.27, 51.53, 25.30)},
-        "search": {"iterations": 30, "budget": "15%"},
+        "search": {"planner": "monte-carlo", "iterations": 30, "budget": "15%"},  # of no sensor that it knows
         "flight": {"altitude_m": HEIGHT_M},
     }
     with pytest.MonkeyPatch.context() as patch:

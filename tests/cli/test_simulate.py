@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from sparsor.cli import simulate as command
 from sparsor.cli.simulate import simulate
+from sparsor.mission.sidecar import read_sidecar
 
 app = typer.Typer()
 app.command()(simulate)
@@ -55,10 +56,11 @@ def test_a_mission_folder_is_all_that_it_takes(tmp_path):
         try:
             lines = [running.stdout.readline() for _ in range(6)]
             assert "ArduCopter" in lines[0]
-            assert "51.5052 25.278" in lines[0]
+            home = read_sidecar(DOHA / "doha.npz").home
+            assert f"{home[0]:.4f} {home[1]:.4f}" in lines[0]
             assert "sends to 127.0.0.1:9; connect there to udpin://0.0.0.0:9" in lines[2]
             assert str(truth) in lines[3]
-            assert "t90 30 s, noise 1 ppb" in lines[4]
+            assert "t90 30 s, noise 5 ppb" in lines[4]
             assert re.search(rf"sparsor fly {re.escape(str(DOHA))} --connect tcpout://127.0.0.1:\d+$", lines[5].strip())
             assert truth.stat().st_size > 1000
             running.send_signal(signal.SIGINT)

@@ -218,6 +218,16 @@ def test_damage_in_a_px4_log_costs_the_messages_that_it_touches(hurt):
     assert places <= 4 * len(hurt) + touched
 
 
+def test_rubbish_behind_a_names_end_is_no_other_sensor():
+    content = bytearray(LONG_ULOG)
+    at = content.rfind(b"NO2\x00\x00") + 5
+    content[at] = 0x80
+    whole, other = (
+        [(one.name, one.value.tolist()) for one in read_ulog(bytes(one)).values] for one in (LONG_ULOG, content)
+    )
+    assert other == whole
+
+
 def test_a_whole_px4_log_and_one_that_breaks_off_are_left_alone():
     for end in (len(LONG_ULOG), len(LONG_ULOG) - 5, len(LONG_ULOG) // 2):
         content = LONG_ULOG[:end]

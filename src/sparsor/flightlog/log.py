@@ -153,7 +153,7 @@ class NamedValues:
     value: NDArray[np.float64]
     places: Places | None = None
 
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> NamedValues:
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> NamedValues:
         """Return some of the values."""
         return replace(
             self,

@@ -12,6 +12,7 @@ import numpy as np
 from sparsor.errors import LogError
 from sparsor.flightlog.log import AMBIENT, AUTOPILOT, Damage, NamedValues, Places, Sender
 from sparsor.flightlog.recording import Fixes, Happening, Recording, Ticks, UnixTimes, changes
+from sparsor.flightlog.texts import rows_by_text
 from sparsor.flightlog.ulogrepair import mended
 
 if TYPE_CHECKING:
@@ -176,11 +177,9 @@ def _by_name(message: str, data: Columns, label: str, columns: dict[str, str], o
     letters = [data[f"{label}[{place}]"] for place in range(len(data)) if f"{label}[{place}]" in data]
     if not letters:
         return
-    codes = np.stack(letters, axis=1)
-    unique, which = np.unique(codes, axis=0, return_inverse=True)
-    for number, code in enumerate(unique):
-        name = bytes(code.astype(np.uint8)).partition(b"\x00")[0].decode("utf-8", "replace").strip()
-        rows = which.ravel() == number
+    codes = np.ascontiguousarray(np.stack(letters, axis=1).astype(np.uint8))
+    named = sorted(rows_by_text(codes.view(f"S{len(letters)}")[:, 0]), key=lambda pair: pair[0])
+    for name, rows in named:
         for ending, column in ((ending, column) for ending, column in columns.items() if column in data):
             yield _values(message, f"{name}{ending}", data, data[column], order).take(rows)
 
