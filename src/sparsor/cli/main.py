@@ -16,6 +16,7 @@ from sparsor.cli.reconstruct import reconstruct
 from sparsor.cli.record import record
 from sparsor.cli.send import send
 from sparsor.cli.simulate import simulate
+from sparsor.cli.study import study
 from sparsor.cli.upload import upload
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ app.command("record")(record)
 app.command("download")(download)
 app.command("send")(send)
 app.command("simulate")(simulate)
+app.command("study")(study)
 
 
 def _alone(name: str, command: Callable[..., None]) -> typer.Typer:
