@@ -8,6 +8,7 @@ import typer
 
 from sparsor import __version__
 from sparsor.cli.download import download
+from sparsor.cli.fetch import fetch
 from sparsor.cli.fly import fly
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
@@ -46,6 +47,7 @@ app.command("download")(download)
 app.command("send")(send)
 app.command("simulate")(simulate)
 app.command("study")(study)
+app.command("fetch")(fetch)
 
 
 def _alone(name: str, command: Callable[..., None]) -> typer.Typer:
