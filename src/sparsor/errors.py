@@ -102,5 +102,9 @@ class CalibrationError(InputError):
     """A calibration, unit or gas that is unknown, or that the log does not hold what is needed for."""
 
 
+class DownloadError(SparsorError):
+    """A file that the network did not give: the server is not there, lacks it, or gave another."""
+
+
 class OutputError(SparsorError):
     """The result could not be written: the folder is read-only, full or gone."""

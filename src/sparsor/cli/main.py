@@ -8,6 +8,7 @@ import typer
 
 from sparsor import __version__
 from sparsor.cli.download import download
+from sparsor.cli.fetch import fetch
 from sparsor.cli.fly import fly
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
@@ -16,6 +17,7 @@ from sparsor.cli.reconstruct import reconstruct
 from sparsor.cli.record import record
 from sparsor.cli.send import send
 from sparsor.cli.simulate import simulate
+from sparsor.cli.study import study
 from sparsor.cli.upload import upload
 
 if TYPE_CHECKING:
@@ -44,6 +46,8 @@ app.command("record")(record)
 app.command("download")(download)
 app.command("send")(send)
 app.command("simulate")(simulate)
+app.command("study")(study)
+app.command("fetch")(fetch)
 
 
 def _alone(name: str, command: Callable[..., None]) -> typer.Typer:

@@ -169,7 +169,7 @@ def decode_lasso(
     best, least, worse = LASSO_WEIGHTS[-1], np.inf, 0
     for weight in reversed(LASSO_WEIGHTS):
         error = float(metric(truth, _lasso_maps(case, made, psi, sums, weight, values)).mean())
-        best, least, worse = (weight, error, 0) if error < least else (best, least, worse + 1)
+        best, least, worse = (weight, error, 0) if error < least else (best, least, worse + (error > least))
         if worse == _WORSE:
             break
     return _lasso_maps(case, made, psi, sums, best, made.of(case.sets.test, "test"))

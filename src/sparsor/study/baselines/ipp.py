@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 DECAYS = (2.0, 4.0, 8.0, 16.0, 32.0)
 # The noise that the gain is planned with sets how far a step is: with little, the cell next door tells enough.
-NOISES = (1e-2, 1e-1, 1.0, 10.0)
+NOISES = (1e-3, 1e-2, 1e-1, 1.0)
 _PREDICTING = (1e-3, 1e-2, 1e-1)
 _ROOT3 = float(np.sqrt(3.0))
 # Of the grid's sides: the centre, a corner's middle, half-way along a side.
