@@ -10,13 +10,15 @@ import numpy as np
 from hypothesis import strategies as st
 
 from sparsor.mission import Home, build_mission
-from sparsor.vehicle import load_vehicle
+from sparsor.vehicle import CALM, SteadyWind, load_vehicle
 
 if TYPE_CHECKING:
     from sparsor.mission import MissionPlan
+    from sparsor.vehicle import Vehicle
 
 QUAD = load_vehicle("quad")
 AUTOPILOT_NAMES = ("ardupilot", "px4")
+KINDS = ("quad", "plane", "vtol", "rover", "boat")
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,25 @@ def plans(draw: st.DrawFn, *, across: bool = False, largest_m: float = 2e4) -> M
 KNOWN_HOME = Home(51.505, 25.265, 12.5, altitude_known=True)
 
 
-def example_plan(autopilot: str = "ardupilot", stops: int = 9, home: Home | None = KNOWN_HOME) -> MissionPlan:
+def example_plan(
+    autopilot: str = "ardupilot",
+    stops: int = 9,
+    home: Home | None = KNOWN_HOME,
+    vehicle: Vehicle = QUAD,
+    hold_s: float = 4,
+    wind: SteadyWind = CALM,
+    span_deg: float = 0.03,
+) -> MissionPlan:
     """Return one plan near Doha for the tests that need no more."""
     rng = np.random.default_rng(7)
-    lon, lat = 51.50 + 0.03 * rng.random(stops), 25.27 + 0.03 * rng.random(stops)
-    return build_mission(lon, lat, home=home, vehicle=QUAD, autopilot=autopilot, altitude_m=60, hold_s=4)
+    lon, lat = 51.50 + span_deg * rng.random(stops), 25.27 + span_deg * rng.random(stops)
+    return build_mission(
+        lon,
+        lat,
+        home=home,
+        vehicle=vehicle,
+        autopilot=autopilot,
+        altitude_m=60 if vehicle.flies else 0,
+        hold_s=hold_s,
+        wind=wind,
+    )

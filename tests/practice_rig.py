@@ -36,6 +36,10 @@ def item_message(seq: int, command: int, frame: int, params: tuple[float, ...], 
     )
 
 
+def _flavour(autopilot: str, settings: dict[str, Any]) -> Any:
+    return flavour_named(autopilot).on(settings["vehicle"].kind if "vehicle" in settings else "quad")
+
+
 @dataclass
 class Rig:
     """One vehicle and one ground station; simulated time is wall time."""
@@ -48,7 +52,7 @@ class Rig:
     def of(cls, autopilot: str, *, plan: Any = None, **settings: Any) -> Rig:
         plan = plan or example_plan(autopilot)
         settings.setdefault("sensor", SensorSettings())
-        vehicle = PracticeAutopilot(PracticeSettings(home=plan.home, flavour=flavour_named(autopilot), **settings))
+        vehicle = PracticeAutopilot(PracticeSettings(home=plan.home, flavour=_flavour(autopilot, settings), **settings))
         vehicle.join(STATION.link)
         return cls(vehicle)
 

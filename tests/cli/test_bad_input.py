@@ -54,7 +54,7 @@ def test_boxes(console, tree, box, said):
         ("--budget 130%", ("'130%'", "100%")),
         ("--vehicle zeppelin", ("'zeppelin'", "quad", ".toml")),
         ("--vehicle none.toml", ("none.toml", "No such file")),
-        ("--altitude -5", ("--altitude", "-5.0", "greater than 0")),
+        ("--altitude -5", ("--altitude", "-5.0", "greater than or equal to 0")),
         ("--altitude 30000", ("--altitude", "30000", "less than or equal to 20000")),
         ("--speed 0", ("--speed", "0.0", "greater than 0")),
         ("--hold -1", ("--hold", "-1.0", "greater than or equal to 0")),

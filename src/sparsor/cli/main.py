@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sparsor import __version__
+from sparsor.cli.check import check
 from sparsor.cli.download import download
 from sparsor.cli.fetch import fetch
 from sparsor.cli.fly import fly
@@ -40,6 +41,7 @@ app.command("plan")(plan)
 app.command("reconstruct")(reconstruct)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
+app.command("check")(check)
 app.command("upload")(upload)
 app.command("fly")(fly)
 app.command("record")(record)

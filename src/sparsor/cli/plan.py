@@ -181,20 +181,38 @@ def plan(
     ] = None,
     scheduler: Annotated[str | None, _option(SEARCH, SCHEDULER, "--scheduler", metavar="local|ADDRESS")] = None,
     vehicle: Annotated[
-        str | None, _option(FLIGHT, "quad, or a profile of your own (.toml) (default: quad).", "--vehicle")
+        str | None,
+        _option(
+            FLIGHT,
+            "quad, plane, vtol, rover, boat, or a profile of your own (.toml) (default: quad).",
+            "--vehicle",
+            metavar="NAME|FILE.toml",
+        ),
     ] = None,
     autopilot: Annotated[
         str | None, _option(FLIGHT, "ardupilot or px4 (default: ardupilot).", "--autopilot", metavar="NAME")
     ] = None,
     altitude: Annotated[
-        float | None, _option(FLIGHT, "Height above home, m (default: 50).", "--altitude", metavar="M")
+        float | None,
+        _option(FLIGHT, "Height above home, m (default: 50; 0 for rovers and boats).", "--altitude", metavar="M"),
     ] = None,
     speed: Annotated[
         float | None,
-        _option(FLIGHT, "Speed along legs, m/s (default: the vehicle's).", "--speed", metavar="M_S"),
+        _option(
+            FLIGHT,
+            "Speed along legs, m/s (default: the vehicle's); airspeed of planes.",
+            "--speed",
+            metavar="M_S",
+        ),
     ] = None,
     hold: Annotated[
-        float | None, _option(FLIGHT, "Dwell time at each stop, s (default: 5).", "--hold", metavar="S")
+        float | None,
+        _option(
+            FLIGHT,
+            "Dwell time at each stop, s (default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
+            "--hold",
+            metavar="S",
+        ),
     ] = None,
     home: Annotated[
         tuple[float, float] | None,
@@ -203,6 +221,10 @@ def plan(
     home_altitude: Annotated[
         float | None,
         _option(FLIGHT, "Height of home above mean sea level, m.", "--home-altitude", metavar="M"),
+    ] = None,
+    wind: Annotated[
+        tuple[float, float] | None,
+        _option(FLIGHT, "Wind to plan for: m/s, and where it comes from.", "--wind", metavar="SPEED FROM_DEG"),
     ] = None,
     sensor_profile: Annotated[
         str | None,
@@ -262,6 +284,7 @@ def plan(
             "hold_s": hold,
             "home": home,
             "home_altitude_m": home_altitude,
+            "wind": wind,
         },
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},

@@ -25,6 +25,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "path_length_cells": found.length_cells,
         "coverage_fraction": mission.coverage_fraction,
         "flight_time_s": mission.flight_time_s,
+        "endurance_used_s": mission.used_s,
         "endurance_s": mission.vehicle.endurance_s,
         "flyable": mission.flyable,
         "sorties": 1,
@@ -59,9 +60,9 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{mission.flown_length_m / 1000:.2f} km with the way home",
         ),
         (
-            "time in the air",
-            f"{mission.flight_time_s / 60:.1f} min; {vehicle.name}: {vehicle.endurance_s / 60:.0f} min endurance, "
-            f"{mission.usable_s / 60:.0f} min less reserve",
+            "time in the air" if vehicle.flies else "time under way",
+            f"{mission.flight_time_s / 60:.1f} min{_of_the_battery(mission)}; {vehicle.name}: "
+            f"{vehicle.endurance_s / 60:.0f} min endurance, {mission.usable_s / 60:.0f} min less reserve",
         ),
         ("flyable", "yes, by endurance" if mission.flyable else "no: a planning study (see the warnings)"),
         (
@@ -104,6 +105,13 @@ def _stops(mission: PlannedMission) -> str:
     holds_s = [stop.hold_s for stop in mission.plan.stops if stop.hold_s > 0]
     dwells = f"; {sum(holds_s):g} s of dwelling at {len(holds_s)} of them" if holds_s else ", none dwelt at"
     return f"{stops} turning points{dwells}; {over} cells flown over and measured"
+
+
+def _of_the_battery(mission: PlannedMission) -> str:
+    """Return the part of the endurance that is used, where that is not the time: hovering takes more than cruising."""
+    if mission.used_s == mission.flight_time_s:
+        return ""
+    return f", as {mission.used_s / 60:.1f} min of cruising by power"
 
 
 def curve_table(

@@ -27,7 +27,7 @@ def _what_would_fly(mission: PlannedMission) -> str:
     if mission.flyable:
         return ""
     start = (
-        f"A planning study, not a flight: it takes {mission.flight_time_s / 60:.0f} min in the air, the "
+        f"A planning study, not a flight: it takes {mission.used_s / 60:.0f} min {_of_what(mission)}, the "
         f"{mission.vehicle.name} has {mission.usable_s / 60:.0f} min less its reserve. "
     )
     fixed_s = _seconds_at_any_size(mission)
@@ -37,7 +37,7 @@ def _what_would_fly(mission: PlannedMission) -> str:
             "Climbing, dwelling, landing and the way from and to home alone take longer: shorten --hold, take off "
             "nearer, or take a vehicle of longer endurance (--vehicle FILE.toml)."
         )
-    shrink = left_s / (mission.flight_time_s - fixed_s)
+    shrink = left_s / max(mission.used_s - fixed_s, 1.0)
     box = mission.place.grid.box
     return start + (
         f"The same route over a box of {_down(shrink * box.east_m)} x {_down(shrink * box.north_m)} km would fit, or "
@@ -46,12 +46,19 @@ def _what_would_fly(mission: PlannedMission) -> str:
     )
 
 
+def _of_what(mission: PlannedMission) -> str:
+    same = mission.used_s == mission.flight_time_s
+    place = "in the air" if mission.vehicle.flies else "under way"
+    return place if same else f"of the endurance at cruise ({mission.flight_time_s / 60:.0f} min {place})"
+
+
 def _seconds_at_any_size(mission: PlannedMission) -> float:
     """Return the part of the flight that a smaller box would not shorten."""
     flight, plan = mission.specification.flight, mission.plan
     # A home of its own stays where it is; one at the first stop comes nearer with the rest.
     transit_m = 0.0 if flight.home is None else mission.flown_length_m - mission.path_length_m
-    return flight_seconds(
+    beside_s = mission.used_s - mission.flight_time_s  # hovering takes more out of the battery than cruising
+    return beside_s + flight_seconds(
         mission.vehicle,
         path_length_m=0.0,
         transit_m=transit_m,

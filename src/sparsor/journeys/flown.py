@@ -189,6 +189,18 @@ def folder_sidecar(folder: Path) -> tuple[Path, Sidecar]:
     )
 
 
+def sidecar_of(plan: Path) -> Sidecar | None:
+    """Return the sidecar beside a plan that remembers it."""
+    for candidate in sorted(plan.parent.glob("*.npz")):
+        try:
+            sidecar = read_sidecar(candidate)
+        except MissionError:
+            continue
+        if plan.name in sidecar.plans:
+            return sidecar
+    return None
+
+
 def is_edited(plan: Path, sidecar: Sidecar) -> bool:
     """Return whether a plan's file is no longer what its sidecar remembers."""
     return content_hash(plan.read_bytes()) != sidecar.plans.get(plan.name)

@@ -6,15 +6,17 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from sparsor.errors import MissionError
-from sparsor.journeys.flown import is_edited, plan_changes
+from sparsor.journeys.flown import is_edited, plan_changes, sidecar_of
 from sparsor.journeys.loginspection import inspect_log
 from sparsor.mission import describe_plan, read_plan
-from sparsor.mission.sidecar import Sidecar, read_sidecar
+from sparsor.mission.sidecar import read_sidecar
 from sparsor.mission.specification import read_specification
 from sparsor.prior.model import Model, model_from_arrays, read_npz
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from sparsor.mission.sidecar import Sidecar
 
 LOGS = frozenset({".tlog", ".bin", ".ulg", ".csv"})
 
@@ -72,7 +74,7 @@ def inspect_file(path: Path) -> Inspection:
 def _plan(path: Path) -> Inspection:
     plan = read_plan(path)
     description = describe_plan(plan)
-    sidecar = _sidecar_of(path)
+    sidecar = sidecar_of(path)
     edited = None if sidecar is None else is_edited(path, sidecar)
     changes = plan_changes(plan, sidecar) if edited and sidecar is not None else ()
     lines = [f"{path}: a QGroundControl plan", *description.lines]
@@ -82,18 +84,6 @@ def _plan(path: Path) -> Inspection:
         )
     lines += [f"Changed: {change}" for change in changes]
     return Inspection("plan", {**asdict(description), "edited": edited, "changes": list(changes)}, tuple(lines))
-
-
-def _sidecar_of(plan: Path) -> Sidecar | None:
-    """Return the sidecar beside a plan that remembers it."""
-    for candidate in sorted(plan.parent.glob("*.npz")):
-        try:
-            sidecar = read_sidecar(candidate)
-        except MissionError:
-            continue
-        if plan.name in sidecar.plans:
-            return sidecar
-    return None
 
 
 def _model_contents(model: Model) -> dict[str, Any]:

@@ -9,13 +9,14 @@ from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
 from sparsor.design import Weights
 from sparsor.design.expectation import expected_errors
+from sparsor.errors import MissionError
 from sparsor.geodesy.lengths import distance_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
-from sparsor.mission import Home, MissionPlan, build_mission
-from sparsor.vehicle import Autopilot, SensorProfile, Vehicle, flight_seconds, usable_seconds
+from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan
+from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,6 +54,8 @@ class PlannedMission:
         The same with the ways from and to home.
     flight_time_s : float
         From take-off to landing.
+    used_s : float
+        Of the vehicle's endurance: the same where every phase takes the power of cruising.
     expected_relative_error : float
         Mean of ``|s - s_hat| / |s - mean(s)|`` over the validation maps, decoded from the sums of Phi; of the refined
         search by the best linear decoder from every cell flown over.
@@ -72,6 +75,7 @@ class PlannedMission:
     path_length_m: float
     flown_length_m: float
     flight_time_s: float
+    used_s: float
     cells_flown_over: int
     expected_relative_error: float
     expected_relative_error_cells: float
@@ -85,7 +89,7 @@ class PlannedMission:
     @property
     def flyable(self) -> bool:
         """Whether the flight fits into the vehicle's endurance less its reserve."""
-        return self.flight_time_s <= self.usable_s
+        return self.used_s <= self.usable_s
 
     @property
     def coverage_fraction(self) -> float:
@@ -172,18 +176,11 @@ def _assemble(
         speed_m_s=flight.speed_m_s,
         hold_s=_holds_s(flight.hold_s, candidate, prepared.autopilot),
         fence_margin_m=flight.fence_margin_m,
+        wind=prepared.wind,
     )
     path_m = legs.path_length(stops)
     transit = distance_m(plan.home.lon_deg, plan.home.lat_deg, lon[[0, -1]], lat[[0, -1]]).sum()
-    seconds = flight_seconds(
-        vehicle,
-        path_length_m=path_m,
-        transit_m=float(transit),
-        stops=stops.size,
-        hold_s=[stop.hold_s for stop in plan.stops],
-        altitude_m=flight.altitude_m,
-        speed_m_s=prepared.speed_m_s,
-    )
+    time = time_plan(plan, vehicle, prepared.wind)
     mission = PlannedMission(
         specification=spec,
         place=place,
@@ -195,13 +192,22 @@ def _assemble(
         plan=plan,
         path_length_m=path_m,
         flown_length_m=path_m + float(transit),
-        flight_time_s=seconds,
+        flight_time_s=time.seconds,
+        used_s=time.used_s,
         cells_flown_over=legs.cells_under(stops).size,
         expected_relative_error=expected[0] * prior.widening,
         expected_relative_error_cells=expected[1] * prior.widening,
         warnings=(),
     )
+    _check(mission, prepared.wind)
     return replace(mission, warnings=(*warnings, *advice(mission), *plan.warnings, *prior.warnings))
+
+
+def _check(mission: PlannedMission, wind: SteadyWind) -> None:
+    """Refuse a flyable plan that `sparsor check` would fail."""
+    faults = [fault.sentence for fault in check_faults(mission.plan, mission.vehicle, wind) if fault.fails]
+    if mission.flyable and faults:
+        raise MissionError(f"the plan fails its checks and is not written: {' '.join(faults)}")
 
 
 def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candidate) -> Candidate:

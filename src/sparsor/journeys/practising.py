@@ -151,7 +151,7 @@ def prepare_practice(request: PracticeRequest) -> Practice:
     flown = load_vehicle(request.vehicle or (flight.vehicle if flight else "quad"))
     settings = PracticeSettings(
         home=home,
-        flavour=flavour_named(request.autopilot or (flight.autopilot if flight else "ardupilot")),
+        flavour=flavour_named(request.autopilot or (flight.autopilot if flight else "ardupilot")).on(flown.kind),
         vehicle=flown,
         sensor=_sensor(request, mission[1].sensor if mission else None),
         truth=truth,

@@ -13,14 +13,17 @@ from sparsor.design.sparsity import check_sparsity
 from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
-from sparsor.geodesy.lengths import distance_m
+from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.mission.specification import PAPER_ROWS
 from sparsor.vehicle import (
+    CALM,
     Autopilot,
     SensorProfile,
+    SteadyWind,
     Vehicle,
     autopilot_named,
+    check_wind,
     flight_seconds,
     load_sensor,
     load_vehicle,
@@ -53,13 +56,14 @@ class Prepared:
     place : Place
     prior : PriorChoice
     legs : LegTable
-        Metres, and seconds at the mission's speed.
+        Metres, and seconds at the mission's speed in its wind.
     vehicle : Vehicle
     autopilot : Autopilot
     sensor : SensorProfile or None
         None when nothing was said of it and the planner does without.
     speed_m_s : float
         Along legs.
+    wind : SteadyWind
     """
 
     place: Place
@@ -69,6 +73,7 @@ class Prepared:
     autopilot: Autopilot
     sensor: SensorProfile | None
     speed_m_s: float
+    wind: SteadyWind = CALM
 
     def hold(self, spec: MissionSpecification) -> tuple[float, float]:
         """Return one hold at a stop, as it is written, and the braking that goes with it, both seconds."""
@@ -86,7 +91,7 @@ class Prepared:
             return Budget(asked.value, "distance")
         home = None
         if spec.flight.home is not None:
-            home = distance_m(*spec.flight.home, *self.place.grid.centres_deg()) / self.speed_m_s
+            home = home_seconds(self.place.grid, spec.flight.home, self.vehicle, self.speed_m_s, self.wind)
         fixed = flight_seconds(
             self.vehicle,
             path_length_m=0.0,
@@ -94,7 +99,7 @@ class Prepared:
             stops=0,
             hold_s=0.0,
             altitude_m=spec.flight.altitude_m,
-            speed_m_s=self.speed_m_s,
+            speed_m_s=self.speed_m_s - (self.wind.speed_m_s if self.vehicle.circles else 0.0),
         )
         return Budget(asked.value, "time", sum(self.hold(spec)), fixed, home)
 
@@ -136,7 +141,9 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
     place = _place(Grid(box, prior.model.shape), area)
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
-    return Prepared(place, prior, _legs(place, speed), vehicle, autopilot, sensor, speed)
+    wind = spec.flight.steady_wind
+    check_wind(vehicle, wind, speed)
+    return Prepared(place, prior, _legs(place, vehicle, speed, wind), vehicle, autopilot, sensor, speed, wind)
 
 
 def _sensor(spec: MissionSpecification) -> SensorProfile | None:
@@ -163,7 +170,8 @@ def _place(grid: Grid, area: Area | None) -> Place:
     return Place(grid, area, allowed, grid.full_coverage_m(allowed))
 
 
-def _legs(place: Place, speed_m_s: float) -> LegTable:
+def _legs(place: Place, vehicle: Vehicle, speed_m_s: float, wind: SteadyWind) -> LegTable:
     length_m = place.grid.lengths_m()
     cell_unit_m = place.full_coverage_m / (int(place.allowed.sum()) - 1)
-    return LegTable(place.grid.shape, length_m, length_m / speed_m_s, cell_unit_m, place.allowed).kept_inside()
+    seconds = leg_seconds_between(place.grid, length_m, vehicle, speed_m_s, wind)
+    return LegTable(place.grid.shape, length_m, seconds, cell_unit_m, place.allowed).kept_inside()

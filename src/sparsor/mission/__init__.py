@@ -6,11 +6,14 @@ The .plan format, frames and commands are those of docs/mission-items.md.
 from sparsor.mission.builder import build_mission, flight_time_s
 from sparsor.mission.describe import PlanDescription, describe_plan
 from sparsor.mission.exports import FORMATS, export_bytes
-from sparsor.mission.faults import Fault, judged_faults, plan_faults
+from sparsor.mission.fault import Fault
+from sparsor.mission.faults import judged_faults, plan_faults
 from sparsor.mission.fence import fence_around
 from sparsor.mission.items import MissionItem
 from sparsor.mission.plan import Circle, ComplexItem, Fence, Home, MissionPlan, RallyPoint
 from sparsor.mission.reader import parse_plan, read_plan
+from sparsor.mission.timing import FlightTime, time_plan
+from sparsor.mission.vehiclefaults import check_faults, vehicle_faults
 from sparsor.mission.writer import plan_bytes
 
 __all__ = [
@@ -19,12 +22,14 @@ __all__ = [
     "ComplexItem",
     "Fault",
     "Fence",
+    "FlightTime",
     "Home",
     "MissionItem",
     "MissionPlan",
     "PlanDescription",
     "RallyPoint",
     "build_mission",
+    "check_faults",
     "describe_plan",
     "export_bytes",
     "fence_around",
@@ -34,4 +39,6 @@ __all__ = [
     "plan_bytes",
     "plan_faults",
     "read_plan",
+    "time_plan",
+    "vehicle_faults",
 ]

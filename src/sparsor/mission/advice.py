@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sparsor.geodesy.lengths import distance_m
+from sparsor.mission.items import NAV_LOITER_TO_ALT
 
 if TYPE_CHECKING:
     from sparsor.mission.plan import MissionPlan
@@ -25,8 +26,9 @@ def build_warnings(plan: MissionPlan, vehicle: Vehicle, autopilot: Autopilot, wa
         _speed(plan, vehicle),
         _hold(plan, autopilot, wanted_hold_s),
         _antimeridian(plan),
+        _circles(plan, vehicle, autopilot),
     ]
-    if autopilot.name == "px4":
+    if autopilot.name == "px4" and vehicle.flies:
         found += [_px4_take_off(plan), _px4_first_waypoint(plan)]
     return tuple(sentence for sentence in found if sentence)
 
@@ -41,7 +43,7 @@ def _home_altitude(plan: MissionPlan) -> str:
 
 
 def _ceiling(plan: MissionPlan, vehicle: Vehicle) -> str:
-    altitude_m = plan.items[0].altitude_m
+    altitude_m = plan.stops[0].altitude_m
     if altitude_m <= vehicle.ceiling_m:
         return ""
     return (
@@ -64,6 +66,21 @@ def _hold(plan: MissionPlan, autopilot: Autopilot, wanted_s: float) -> str:
     if written_s == wanted_s:
         return ""
     return f"{autopilot.title} holds for whole seconds: {wanted_s:g} s at each stop is written as {written_s:g} s."
+
+
+def _circles(plan: MissionPlan, vehicle: Vehicle, autopilot: Autopilot) -> str:
+    """Say what the vehicle's own parameters have to be for a plane's circles and landing."""
+    if not vehicle.circles:
+        return ""
+    radius = "NAV_LOITER_RAD" if autopilot.waypoint_radius else "WP_LOITER_RAD"
+    said = f"The vehicle turns and circles with a radius of {vehicle.turn_radius_m:g} m here: set {radius} to that."
+    if not autopilot.waypoint_radius:
+        said += " It does not arm with a landing sequence (DO_LAND_START) in the mission until RTL_AUTOLAND is set."
+    approach = next(item for item in plan.items if item.command == NAV_LOITER_TO_ALT)
+    return (
+        f"{said} It comes in from {approach.altitude_m:g} m above home, from the circle at {approach.lon_deg:.5f} E "
+        f"{approach.lat_deg:.5f} N: look whether the ground under that approach is free."
+    )
 
 
 def _antimeridian(plan: MissionPlan) -> str:

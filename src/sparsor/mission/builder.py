@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.errors import MissionError
-from sparsor.geodesy.lengths import distance_m, path_length_m
 from sparsor.mission.advice import build_warnings
 from sparsor.mission.fence import MAX_CORNERS, fence_around
-from sparsor.mission.items import change_speed, land, take_off, waypoint
 from sparsor.mission.plan import Home, MissionPlan, RallyPoint
-from sparsor.vehicle import Autopilot, Vehicle, autopilot_named, flight_seconds
+from sparsor.mission.sequences import BESIDE_STOPS, ends_of, flight_items, room_of
+from sparsor.mission.timing import time_plan
+from sparsor.vehicle import CALM, Autopilot, SteadyWind, Vehicle, autopilot_named, check_wind
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,8 +36,9 @@ def build_mission(
     speed_m_s: float | None = None,
     hold_s: ArrayLike = 0.0,
     fence_margin_m: float = 50.0,
+    wind: SteadyWind = CALM,
 ) -> MissionPlan:
-    """Turn a route into a plan that a multirotor flies from take-off to landing.
+    """Turn a route into a plan that its kind of vehicle flies from take-off to landing.
 
     Every leg is written out, the one home too: a return-to-launch item would fly straight home from wherever
     it is reached, at a height of the vehicle's own. A first stop at home is a waypoint like any other.
@@ -50,15 +51,17 @@ def build_mission(
     autopilot : Autopilot or str
         ``"ardupilot"`` or ``"px4"``.
     altitude_m : float
-        Of the flight, above home, metres.
+        Of the flight, above home, metres; 0 for what drives or swims.
     home : Home, optional
         Default: the first stop, its altitude unknown.
     speed_m_s : float, optional
-        Ground speed along legs; default the vehicle's cruise speed.
+        Along legs, default the vehicle's cruise speed: over the ground, of a plane and a VTOL through the air.
     hold_s : float or array_like (n,)
         Time at all stops, or at each, seconds. ArduPilot keeps whole seconds: a fraction is rounded up.
     fence_margin_m : float
-        Least distance between the flight and its fence, metres.
+        Least distance between the flight and its fence, metres; of a plane and a VTOL beside the room that it turns in.
+    wind : SteadyWind
+        A plane and a VTOL take off and land against it.
 
     Returns
     -------
@@ -71,27 +74,32 @@ def build_mission(
         When a stop, the altitude, speed, hold or margin is out of range, or when there are more items than
         the autopilot stores.
     """
-    facts = autopilot if isinstance(autopilot, Autopilot) else autopilot_named(autopilot)
+    facts = (autopilot if isinstance(autopilot, Autopilot) else autopilot_named(autopilot)).on_board(vehicle)
     lon, lat = _checked_stops(stops_lon_deg, stops_lat_deg)
     home = _rounded(home or Home(float(lon[0]), float(lat[0])))
     speed = _within("speed", vehicle.cruise_m_s if speed_m_s is None else speed_m_s, MAX_SPEED_M_S, "m/s")
-    altitude = _within("altitude", altitude_m, MAX_ALTITUDE_M, "m above home")
+    check_wind(vehicle, wind, speed)
+    altitude = _checked_altitude(altitude_m, vehicle)
     holds = _checked_holds(hold_s, lon.size, facts)
-    _check_count(lon.size, facts)
+    _check_count(lon.size, facts, vehicle)
 
-    radius = vehicle.acceptance_radius_m
-    items = (
-        take_off(home.lon_deg, home.lat_deg, altitude, facts),
-        change_speed(speed),
-        *(
-            waypoint(stop_lon, stop_lat, altitude, hold, radius, facts)
-            for stop_lon, stop_lat, hold in zip(lon, lat, holds, strict=True)
-        ),
-        waypoint(home.lon_deg, home.lat_deg, altitude, 0.0, radius, facts),
-        land(home.lon_deg, home.lat_deg, facts),
+    base = (home.lon_deg, home.lat_deg)
+    path = [base, *zip(lon.tolist(), lat.tolist(), strict=True), base]
+    ends = None
+    if vehicle.circles:
+        ends = ends_of(base, path[1], path[-2], vehicle=vehicle, altitude_m=altitude, wind=wind)
+        path += room_of(ends, vehicle)
+        fence_margin_m += 2.0 * vehicle.turn_radius_m
+    items = flight_items(
+        list(zip(lon.tolist(), lat.tolist(), holds, strict=True)),
+        base,
+        vehicle=vehicle,
+        autopilot=facts,
+        altitude_m=altitude,
+        speed_m_s=speed,
+        ends=ends,
     )
-    path_lon = np.concatenate([[home.lon_deg], lon, [home.lon_deg]])
-    path_lat = np.concatenate([[home.lat_deg], lat, [home.lat_deg]])
+    path_lon, path_lat = np.array(path).T
     fence = fence_around(path_lon, path_lat, fence_margin_m, min(MAX_CORNERS, facts.max_fence_points))
     plan = MissionPlan(
         items=items,
@@ -106,37 +114,25 @@ def build_mission(
     return replace(plan, warnings=build_warnings(plan, vehicle, facts, float(np.max(hold_s))))
 
 
-def flight_time_s(plan: MissionPlan, vehicle: Vehicle) -> float:
-    """Return the time from take-off to landing of a plan that `build_mission` made, seconds.
+def flight_time_s(plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM) -> float:
+    """Return the time from take-off to landing of a plan, seconds.
 
-    Equal to `sparsor.vehicle.flight_seconds` of its route: take-off, home to the first stop, legs, holds, the
-    way home, landing.
+    Of a multirotor without wind equal to `sparsor.vehicle.flight_seconds` of its route: take-off, home to the first
+    stop, legs, holds, the way home, landing.
 
     Raises
     ------
     MissionError
         When the plan has no stop.
     """
-    stops = plan.stops
-    if not stops:
+    if not plan.stops:
         raise MissionError("the plan has no waypoint: there is nothing to time")
-    lon = [stop.lon_deg for stop in stops]
-    lat = [stop.lat_deg for stop in stops]
-    ends = distance_m(plan.home.lon_deg, plan.home.lat_deg, [lon[0], lon[-1]], [lat[0], lat[-1]])
-    return flight_seconds(
-        vehicle,
-        path_length_m=path_length_m(lon, lat),
-        transit_m=float(ends.sum()),
-        stops=len(stops),
-        hold_s=[stop.hold_s for stop in stops],
-        altitude_m=stops[0].altitude_m,
-        speed_m_s=plan.hover_m_s,
-    )
+    return time_plan(plan, vehicle, wind).seconds
 
 
-def max_stops(autopilot: Autopilot) -> int:
-    """Return how many stops fit beside take-off, speed, way home and landing."""
-    return autopilot.max_items - 4 - int(autopilot.home_is_item_0)
+def max_stops(autopilot: Autopilot, kind: str = "quad") -> int:
+    """Return how many stops fit beside what a kind of vehicle needs: take-off, speed, way home and landing."""
+    return autopilot.max_items - BESIDE_STOPS[kind] - int(autopilot.home_is_item_0)
 
 
 def _checked_stops(lon_deg: ArrayLike, lat_deg: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -166,6 +162,14 @@ def _within(what: str, value: float, most: float, unit: str) -> float:
     return float(value)
 
 
+def _checked_altitude(altitude_m: float, vehicle: Vehicle) -> float:
+    if vehicle.flies:
+        return _within("altitude", altitude_m, MAX_ALTITUDE_M, "m above home")
+    if altitude_m != 0:
+        raise MissionError(f"an altitude of {altitude_m:g} m for a {vehicle.kind}, which stays down; give 0")
+    return 0.0
+
+
 def _checked_holds(hold_s: ArrayLike, stops: int, autopilot: Autopilot) -> list[float]:
     given = np.asarray(hold_s, dtype=np.float64)
     if given.shape not in ((), (stops,)):
@@ -176,9 +180,10 @@ def _checked_holds(hold_s: ArrayLike, stops: int, autopilot: Autopilot) -> list[
     return [autopilot.written_hold_s(float(hold)) for hold in np.broadcast_to(given, (stops,))]
 
 
-def _check_count(stops: int, autopilot: Autopilot) -> None:
-    if stops > max_stops(autopilot):
+def _check_count(stops: int, autopilot: Autopilot, vehicle: Vehicle) -> None:
+    most = max_stops(autopilot, vehicle.kind)
+    if stops > most:
         raise MissionError(
             f"{stops} stops are too many for one mission: {autopilot.title} stores {autopilot.max_items} "
-            f"items, which leaves {max_stops(autopilot)} stops; plan fewer or split the area"
+            f"items, which leaves {most} stops; plan fewer or split the area"
         )

@@ -2,46 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from shapely import Point, Polygon
-
+from sparsor.mission.fault import Fault
+from sparsor.mission.fencefaults import fence_faults
 from sparsor.mission.items import (
     DO_CHANGE_SPEED,
+    DO_LAND_START,
     FLOWN_TO,
     FRAME_MISSION,
     FRAME_RELATIVE,
     FRAME_TERRAIN,
     LANDINGS,
+    NAV_LAND,
     NAV_RETURN_TO_LAUNCH,
     POSITION_OPTIONAL,
     TAKE_OFFS,
     WAYPOINTS,
 )
+from sparsor.mission.plan import STAYS_DOWN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sparsor.mission.plan import Fence, MissionPlan
+    from sparsor.mission.plan import MissionPlan
 
 FLIES = frozenset({1, 2, 3, 4, 13, 14, 15, *range(19, 26)})  # MAV_TYPE of what takes off
+PLANE = 1
 COMMON_CEILING_M = 120.0
-
-
-@dataclass(frozen=True)
-class Fault:
-    """One thing that is wrong with a plan.
-
-    Parameters
-    ----------
-    sentence : str
-    serious : bool
-        Whether the plan must not be sent to a vehicle like this; what is not serious has to be known.
-    """
-
-    sentence: str
-    serious: bool = False
 
 
 def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
@@ -51,7 +39,7 @@ def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
 
 def judged_faults(plan: MissionPlan) -> tuple[Fault, ...]:
     """Return each fault noticed, with whether it is serious."""
-    return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *_fenced(plan))
+    return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *fence_faults(plan))
 
 
 def _order(plan: MissionPlan) -> Iterator[Fault]:
@@ -59,16 +47,37 @@ def _order(plan: MissionPlan) -> Iterator[Fault]:
     if not flown:
         yield Fault("There is no item with a position: nothing is flown.", serious=True)
         return
-    if plan.vehicle_type in FLIES and flown[0].command not in TAKE_OFFS:
-        yield Fault("The first item with a position is not a take-off: a vehicle on the ground will not fly this.")
+    flies = plan.vehicle_type in FLIES
+    if flies and flown[0].command not in TAKE_OFFS:
+        yield Fault(
+            "The first item with a position is not a take-off: a vehicle on the ground will not fly this.", wrong=True
+        )
+    late = [place for place, item in enumerate(flown[1:], start=2) if item.command in TAKE_OFFS]
+    if late and not any(item.command in LANDINGS for item in flown[: late[0] - 1]):
+        yield Fault("A take-off comes after other items with a position, without a landing before it.", wrong=True)
+    if plan.vehicle_type in STAYS_DOWN and any(item.command in TAKE_OFFS | LANDINGS for item in flown):
+        yield Fault("The plan takes off or lands, which a rover or a boat does not.", wrong=True)
     last = plan.items[-1].command
     if last == NAV_RETURN_TO_LAUNCH:
         yield Fault(
             "The plan ends with a return to launch: a straight line home from the last waypoint, through "
             "whatever is there."
         )
-    elif plan.vehicle_type in FLIES and not any(item.command in LANDINGS for item in plan.items):
-        yield Fault("The plan neither lands nor returns.")
+    elif flies and not any(item.command in LANDINGS | {NAV_RETURN_TO_LAUNCH} for item in plan.items):
+        yield Fault("The plan neither lands nor returns.", wrong=True)
+    elif flies and flown[-1].command not in LANDINGS:
+        yield Fault("The plan goes on after its landing.")
+    if plan.vehicle_type == PLANE:
+        yield from _of_a_plane(plan)
+
+
+def _of_a_plane(plan: MissionPlan) -> Iterator[Fault]:
+    if any(item.command in WAYPOINTS and item.hold_s > 0 for item in plan.items):
+        yield Fault("Waypoints hold, which a plane does not: it flies through them.")
+    if any(item.command == NAV_LAND for item in plan.items) and not any(
+        item.command == DO_LAND_START for item in plan.items
+    ):
+        yield Fault("The landing has no DO_LAND_START before it: a failsafe will not use it.")
 
 
 def _positions(plan: MissionPlan) -> Iterator[Fault]:
@@ -83,7 +92,8 @@ def _positions(plan: MissionPlan) -> Iterator[Fault]:
                 f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'.",
                 serious=item.command not in POSITION_OPTIONAL,
             )
-        if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
+        flies = plan.vehicle_type not in STAYS_DOWN
+        if flies and item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
             yield Fault(f"Item {place} is a waypoint {item.altitude_m:g} m above home.")
     heights = [item.altitude_m for item in plan.items if item.command in WAYPOINTS and item.frame == FRAME_RELATIVE]
     if heights and max(heights) > COMMON_CEILING_M:
@@ -98,7 +108,7 @@ def _limits(plan: MissionPlan) -> Iterator[Fault]:
         return
     counts = (
         ("mission items", len(plan.items) + int(facts.home_is_item_0), facts.max_items),
-        ("fence points", sum(len(fence.lon_deg) for fence in plan.fences), facts.max_fence_points),
+        ("fence points", sum(len(fence.lon_deg) for fence in plan.fences) + len(plan.circles), facts.max_fence_points),
         ("rally points", len(plan.rally_points), facts.max_rally_points),
     )
     for what, count, most in counts:
@@ -120,32 +130,3 @@ def _frames(plan: MissionPlan) -> Iterator[Fault]:
             )
         elif item.frame == FRAME_TERRAIN:
             yield Fault(f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses.", True)
-
-
-def _fenced(plan: MissionPlan) -> Iterator[Fault]:
-    if not plan.fences and not plan.circles:
-        yield Fault("There is no fence.")
-    places = {"Home": (plan.home.lon_deg, plan.home.lat_deg)}
-    for place, item in enumerate(plan.items, start=1):
-        here = item.command in POSITION_OPTIONAL and item.params[4:6] == (0.0, 0.0)
-        if item.has_position and not here:
-            places[f"Item {place}"] = (item.lon_deg, item.lat_deg)
-    for number, fence in enumerate(plan.fences, start=1):
-        area = _plane(fence)
-        if not area.is_valid:
-            yield Fault(f"Fence polygon {number} crosses itself.", serious=True)
-            continue
-        for name, (lon, lat) in places.items():
-            if area.contains(Point(_near(lon, fence.lon_deg[0]), lat)) != fence.inclusion:
-                side = "outside" if fence.inclusion else "inside"
-                yield Fault(f"{name} lies {side} fence polygon {number}.", serious=True)
-
-
-def _plane(fence: Fence) -> Polygon:
-    lon = [_near(value, fence.lon_deg[0]) for value in fence.lon_deg]
-    return Polygon(list(zip(lon, fence.lat_deg, strict=True)))
-
-
-def _near(lon_deg: float, reference_deg: float) -> float:
-    """Return the longitude that lies within half a turn of another."""
-    return reference_deg + (lon_deg - reference_deg + 180.0) % 360.0 - 180.0

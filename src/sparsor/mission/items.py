@@ -1,4 +1,4 @@
-"""Flight items as MAVLink stores them (MISSION_ITEM_INT), and the four kinds that we write."""
+"""Flight items as MAVLink stores them (MISSION_ITEM_INT), and those that we write."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ NAV_VTOL_LAND = 85
 NAV_DELAY = 93
 NAV_PAYLOAD_PLACE = 94
 DO_CHANGE_SPEED = 178
+DO_LAND_START = 189
 
 # MAV_FRAME: altitude above sea level, none (a command without a position), above home, above terrain.
 FRAME_GLOBAL = 0
@@ -41,7 +42,7 @@ FLOWN_TO = WAYPOINTS | TAKE_OFFS | LANDINGS | LOITERS | {NAV_PAYLOAD_PLACE}
 # An autopilot reads a missing position as "here" for these; for any other the position is the whole point.
 POSITION_OPTIONAL = TAKE_OFFS | LANDINGS | {NAV_PAYLOAD_PLACE} | LOITERS
 
-GROUND_SPEED = 1.0  # DO_CHANGE_SPEED parameter 1 (SPEED_TYPE)
+AIR_SPEED, GROUND_SPEED = 0.0, 1.0  # DO_CHANGE_SPEED parameter 1 (SPEED_TYPE)
 KEEP_THROTTLE = -1.0  # DO_CHANGE_SPEED parameter 3
 
 
@@ -128,24 +129,54 @@ class MissionItem:
             raise MissionError(f"command {self.command} at latitude {lat:g}, longitude {lon:g} has no altitude")
 
 
-def take_off(lon_deg: float, lat_deg: float, altitude_m: float, autopilot: Autopilot) -> MissionItem:
-    """Return NAV_TAKEOFF; the position is always written out (a missing one becomes 0/0 on the way)."""
-    return MissionItem(NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, autopilot.yaw, lat_deg, lon_deg, altitude_m))
+def take_off(
+    lon_deg: float,
+    lat_deg: float,
+    altitude_m: float,
+    autopilot: Autopilot,
+    *,
+    command: int = NAV_TAKEOFF,
+    pitch_deg: float = 0.0,
+) -> MissionItem:
+    """Return a take-off; the position is always written out (a missing one becomes 0/0 on the way)."""
+    return MissionItem(command, FRAME_RELATIVE, (pitch_deg, 0.0, 0.0, autopilot.yaw, lat_deg, lon_deg, altitude_m))
 
 
-def change_speed(speed_m_s: float) -> MissionItem:
-    """Return DO_CHANGE_SPEED to a ground speed; frame 2, the only one that PX4 takes without a position."""
-    return MissionItem(DO_CHANGE_SPEED, FRAME_MISSION, (GROUND_SPEED, speed_m_s, KEEP_THROTTLE, 0.0, 0.0, 0.0, 0.0))
+def change_speed(speed_m_s: float, kind: float = GROUND_SPEED) -> MissionItem:
+    """Return DO_CHANGE_SPEED to a ground or air speed; frame 2, the only one that PX4 takes without a position."""
+    return MissionItem(DO_CHANGE_SPEED, FRAME_MISSION, (kind, speed_m_s, KEEP_THROTTLE, 0.0, 0.0, 0.0, 0.0))
 
 
 def waypoint(
     lon_deg: float, lat_deg: float, altitude_m: float, hold_s: float, radius_m: float, autopilot: Autopilot
 ) -> MissionItem:
-    """Return NAV_WAYPOINT with its hold; `radius_m` only where the autopilot reads one."""
-    radius = radius_m if autopilot.waypoint_radius else 0.0
-    return MissionItem(NAV_WAYPOINT, FRAME_RELATIVE, (hold_s, radius, 0.0, autopilot.yaw, lat_deg, lon_deg, altitude_m))
+    """Return NAV_WAYPOINT with its hold and the radius that counts as reached (0: the vehicle's own)."""
+    return MissionItem(
+        NAV_WAYPOINT, FRAME_RELATIVE, (hold_s, radius_m, 0.0, autopilot.yaw, lat_deg, lon_deg, altitude_m)
+    )
 
 
-def land(lon_deg: float, lat_deg: float, autopilot: Autopilot) -> MissionItem:
-    """Return NAV_LAND at a position on the level of home."""
-    return MissionItem(NAV_LAND, FRAME_RELATIVE, (0.0, 0.0, 0.0, autopilot.yaw, lat_deg, lon_deg, 0.0))
+def loiter(
+    lon_deg: float, lat_deg: float, altitude_m: float, hold_s: float, radius_m: float, autopilot: Autopilot
+) -> MissionItem:
+    """Return NAV_LOITER_TIME, clockwise, left on the line to what follows (parameter 4).
+
+    ArduPilot keeps only the direction of the radius, 1, and circles with WP_LOITER_RAD.
+    """
+    radius = radius_m if autopilot.waypoint_radius else 1.0
+    return MissionItem(NAV_LOITER_TIME, FRAME_RELATIVE, (hold_s, 0.0, radius, 1.0, lat_deg, lon_deg, altitude_m))
+
+
+def land_start() -> MissionItem:
+    """Return DO_LAND_START: here begins the landing, which a failsafe may jump to."""
+    return MissionItem(DO_LAND_START, FRAME_MISSION, (0.0,) * 7)
+
+
+def loiter_to_altitude(lon_deg: float, lat_deg: float, altitude_m: float, radius_m: float) -> MissionItem:
+    """Return NAV_LOITER_TO_ALT, clockwise, left with the heading (1) and on the line (4) to what follows."""
+    return MissionItem(NAV_LOITER_TO_ALT, FRAME_RELATIVE, (1.0, radius_m, 0.0, 1.0, lat_deg, lon_deg, altitude_m))
+
+
+def land(lon_deg: float, lat_deg: float, autopilot: Autopilot, *, command: int = NAV_LAND) -> MissionItem:
+    """Return a landing at a position on the level of home."""
+    return MissionItem(command, FRAME_RELATIVE, (0.0, 0.0, 0.0, autopilot.yaw, lat_deg, lon_deg, 0.0))

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from sparsor.errors import MissionError
-from sparsor.mission.items import LANDINGS, WAYPOINTS
+from sparsor.mission.items import LANDINGS, NAV_LOITER_TIME, WAYPOINTS
 from sparsor.vehicle import AUTOPILOTS
 
 if TYPE_CHECKING:
     from sparsor.mission.items import MissionItem
     from sparsor.vehicle import Autopilot
 
+STAYS_DOWN = frozenset({10, 11})  # MAV_TYPE of rovers and boats
 # MAV_AUTOPILOT to how people write it; other firmware is named by its number.
 TITLES = {facts.firmware_type: facts.title for facts in AUTOPILOTS.values()}
 
@@ -164,13 +165,18 @@ class MissionPlan:
 
     @property
     def stops(self) -> tuple[MissionItem, ...]:
-        """Waypoints of the survey: all of them but the one over the landing place, just before landing."""
-        waypoints = [index for index, item in enumerate(self.items) if item.command in WAYPOINTS]
-        if waypoints and waypoints[-1] + 1 < len(self.items):
-            last, after = self.items[waypoints[-1]], self.items[waypoints[-1] + 1]
-            if after.command in LANDINGS and last.params[4:6] == after.params[4:6]:
-                waypoints.pop()
-        return tuple(self.items[index] for index in waypoints)
+        """Waypoints and timed circles of the survey: all but the waypoint over the landing place, or back at home."""
+        stops = [index for index, item in enumerate(self.items) if item.command in WAYPOINTS | {NAV_LOITER_TIME}]
+        if len(stops) > 1 or (stops and stops[-1] + 1 < len(self.items)):
+            last = self.items[stops[-1]].params[4:6]
+            after = self.items[stops[-1] + 1] if stops[-1] + 1 < len(self.items) else None
+            landed = after is not None and after.command in LANDINGS and last == after.params[4:6]
+            parked = (
+                after is None and self.vehicle_type in STAYS_DOWN and last == (self.home.lat_deg, self.home.lon_deg)
+            )
+            if landed or parked:
+                stops.pop()
+        return tuple(self.items[index] for index in stops)
 
 
 def _check_point(what: str, lon_deg: float, lat_deg: float) -> None:

@@ -19,7 +19,8 @@ from pydantic import (
     model_validator,
 )
 
-from sparsor.errors import MissionError
+from sparsor.errors import MissionError, VehicleError
+from sparsor.vehicle import CALM, SteadyWind, load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,6 +35,7 @@ HEADER = "# Made by sparsor. 'generate-mission mission.toml' makes the same miss
 PAPER_ROWS, PAPER_PROBABILITY, PAPER_THETA = 35, 0.03, 3
 ALGORITHM_1_ITERATIONS = 4000
 DEFAULT_BUDGET = "10%"
+ALTITUDE_M, HOLD_S = 50.0, 5.0
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 # Settings that only Algorithm 1 knows: who gives one asks for it.
 _ALGORITHM_1 = frozenset(
@@ -161,12 +163,25 @@ class FlightSection(_Section):
 
     vehicle: str = "quad"
     autopilot: Literal["ardupilot", "px4"] = "ardupilot"
-    altitude_m: Annotated[FiniteFloat, Field(gt=0, le=20_000)] = 50.0
+    altitude_m: Annotated[FiniteFloat, Field(ge=0, le=20_000)] = ALTITUDE_M
     speed_m_s: Annotated[FiniteFloat, Field(gt=0, le=200)] | None = None
-    hold_s: Annotated[FiniteFloat, Field(ge=0, le=65_535)] = 5.0
+    hold_s: Annotated[FiniteFloat, Field(ge=0, le=65_535)] = HOLD_S
     home: tuple[Longitude, Latitude] | None = None
     home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
+    wind: tuple[FiniteFloat, FiniteFloat] | None = None
+
+    @field_validator("wind")
+    @classmethod
+    def _blows(cls, wind: tuple[float, float] | None) -> tuple[float, float] | None:
+        if wind is not None:
+            SteadyWind(*wind)
+        return wind
+
+    @property
+    def steady_wind(self) -> SteadyWind:
+        """The wind that is planned for."""
+        return CALM if self.wind is None else SteadyWind(*self.wind)
 
 
 class SensorSection(_Section):
@@ -234,7 +249,22 @@ def specification(data: dict[str, Any], *, base: Path) -> MissionSpecification:
         spec = MissionSpecification.model_validate(_without_none(data))
     except ValidationError as error:
         raise MissionError(_explain(error)) from None
-    return _with_paths(spec, lambda path: Path(os.path.normpath(base / path)))
+    spec = _with_paths(spec, lambda path: Path(os.path.normpath(base / path)))
+    return _as_its_vehicle_moves(spec, data.get("flight") or {})
+
+
+def _as_its_vehicle_moves(spec: MissionSpecification, given: Mapping[str, object]) -> MissionSpecification:
+    """Fill in the height and the hold that suit the kind of vehicle, where they were not given."""
+    try:
+        vehicle = load_vehicle(spec.flight.vehicle)
+    except VehicleError:  # said when it is flown with
+        return spec
+    suits: dict[str, float] = {}
+    if not vehicle.flies and given.get("altitude_m") is None:
+        suits["altitude_m"] = 0.0
+    if vehicle.circles and given.get("hold_s") is None:
+        suits["hold_s"] = 0.0
+    return spec.model_copy(update={"flight": spec.flight.model_copy(update=suits)}) if suits else spec
 
 
 def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> MissionSpecification:
@@ -259,6 +289,11 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
     if wanted != search["planner"]:  # what was said to the other one is not meant for it
         for name in ("planner", "iterations", *_ALGORITHM_1):
             search.pop(name, None)
+    flight = merged["flight"]
+    if _without_none(data.get("flight", {})).get("vehicle", flight["vehicle"]) != flight["vehicle"]:
+        for name, usual in (("altitude_m", (ALTITUDE_M, 0.0)), ("hold_s", (HOLD_S, 0.0))):
+            if flight[name] in usual:  # it suited the vehicle of then
+                del flight[name]
     for section, values in _without_none(data).items():
         if section == "area" and values:
             merged[section] = values

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from sparsor.errors import VehicleError
+
+if TYPE_CHECKING:
+    from sparsor.vehicle.profile import Vehicle
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,15 @@ class Autopilot:
     def written_hold_s(self, hold_s: float) -> float:
         """Return the hold that is written for a wish of `hold_s` seconds: rounded up where need be."""
         return float(math.ceil(hold_s - 1e-9)) if self.whole_second_holds else hold_s
+
+    def on_board(self, vehicle: Vehicle) -> Autopilot:
+        """Return the same autopilot on a vehicle whose board stores less than usual."""
+        return replace(
+            self,
+            max_items=min(self.max_items, vehicle.max_items or self.max_items),
+            max_fence_points=min(self.max_fence_points, vehicle.max_fence_points or self.max_fence_points),
+            max_rally_points=min(self.max_rally_points, vehicle.max_rally_points or self.max_rally_points),
+        )
 
 
 # Seen in SITL (ArduCopter 4.6.2) and in PX4's sources; see docs/mission-items.md.

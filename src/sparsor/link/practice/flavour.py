@@ -6,7 +6,7 @@ ArduPilot's values were seen on ArduCopter 4.6 in SITL; PX4's are from its sourc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -67,6 +67,13 @@ class Flavour:
     streams_unasked: bool
     disarm_s: float
     parameters: tuple[tuple[str, float, int], ...]
+
+    def on(self, kind: str) -> Flavour:
+        """Return the flavour on a kind of vehicle: ArduPilot's modes have other numbers on planes and rovers."""
+        if self.is_px4 or kind not in _ARDUPILOTS:
+            return self
+        title, modes = _ARDUPILOTS[kind]
+        return replace(self, title=title, modes=modes)
 
     @property
     def is_px4(self) -> bool:
@@ -171,6 +178,30 @@ PX4 = Flavour(
         ("RTL_RETURN_ALT", 30, _REAL32),
     ),
 )
+
+# ArduPlane's and Rover's own numbers (mode.h of each); a quadplane has ArduPlane's.
+_PLANE_MODES = (
+    (Mode.MANUAL, "MANUAL", 0),
+    (Mode.MISSION, "AUTO", 10),
+    (Mode.RETURN, "RTL", 11),
+    (Mode.HOLD, "LOITER", 12),
+    (Mode.GUIDED, "GUIDED", 15),
+    (Mode.LAND, "QLAND", 20),
+)
+_ROVER_MODES = (
+    (Mode.MANUAL, "MANUAL", 0),
+    (Mode.HOLD, "HOLD", 4),
+    (Mode.MISSION, "AUTO", 10),
+    (Mode.RETURN, "RTL", 11),
+    (Mode.LAND, "HOLD", 4),  # what it does instead
+    (Mode.GUIDED, "GUIDED", 15),
+)
+_ARDUPILOTS = {
+    "plane": ("ArduPlane (practice)", _PLANE_MODES),
+    "vtol": ("ArduPlane (practice)", _PLANE_MODES),
+    "rover": ("ArduRover (practice)", _ROVER_MODES),
+    "boat": ("ArduRover (practice)", _ROVER_MODES),
+}
 
 FLAVOURS = {flavour.name: flavour for flavour in (ARDUPILOT, PX4)}
 

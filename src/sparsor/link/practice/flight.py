@@ -23,6 +23,7 @@ BLIND = (Mode.MANUAL, Mode.LAND)
 # A gust is soon over and is not worth a word.
 BLOWN_FOR_S, WIND_SAID_EVERY_S = 3.0, 30.0
 BATTERY_CHANGE_S = 10.0
+STANDING_M_S = 0.05
 
 
 class Flight(FlightState):
@@ -62,6 +63,14 @@ class Flight(FlightState):
         """Whether the wind has been the stronger one for a while."""
         airborne = self.armed and not self.landed
         return airborne and self.motion.overpowered and self.time_s - self._blown_since_s >= BLOWN_FOR_S
+
+    @property
+    def under_way(self) -> bool:
+        """Whether it is in the air, or what drives or swims is on its mission or its way back."""
+        if self.vehicle.flies or not self.armed:
+            return not self.landed
+        moving = self.motion.ground_speed_m_s > STANDING_M_S
+        return moving or (self.mode is Mode.MISSION and self.mission_started and not self.navigator.finished)
 
     def set_mode(self, mode: Mode | None) -> int:
         """Change the mode; returns a MAV_RESULT and says why not."""
@@ -134,16 +143,18 @@ class Flight(FlightState):
         self._keep_position()
 
     def _fly(self, dt_s: float) -> None:
-        flying = not self.landed
+        flying = self.under_way
         self.battery.use(dt_s, flying_draw(self.motion.airspeed_m_s, self.vehicle.cruise_m_s) if flying else IDLE_SHARE)
         aim = self._aim()
-        if not self.landed or (aim.up_m > 0.1 and not aim.landing):
+        if flying or (aim.up_m > 0.1 and not aim.landing):
             self.motion.step(replace(aim, adrift=True) if self.position_lost else aim, dt_s)
             self._touch(aim)
             self._watch_fence()
             self._watch_wind()
-        if self.landed:
+        if self.landed and not self.under_way:
             self._disarm_on_ground()
+        elif not self.vehicle.flies:
+            self._landed_s = self.time_s
 
     def _needs_position(self, mode: Mode) -> str:
         title = self.flavour.mode_title(mode)

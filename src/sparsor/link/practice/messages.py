@@ -131,7 +131,9 @@ def _system_time(flight: Flight, boot_unix_s: float) -> Message:
 
 def _extended_state(flight: Flight, _: float) -> Message:
     motion, landed = flight.motion, mavlink.MAV_LANDED_STATE_IN_AIR
-    if flight.landed:
+    if not flight.vehicle.flies and not flight.flavour.is_px4:
+        landed = mavlink.MAV_LANDED_STATE_UNDEFINED  # ArduRover does not say
+    elif flight.landed:
         landed = mavlink.MAV_LANDED_STATE_ON_GROUND
     elif motion.up_m < 1.0 and motion.up_m_s > 0:
         landed = mavlink.MAV_LANDED_STATE_TAKEOFF

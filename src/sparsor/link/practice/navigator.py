@@ -108,7 +108,7 @@ class Navigator:
                 continue
             if self._start is None:
                 self._start = (motion.east_m, motion.north_m)
-                self._lift_m = self._height_to_lift_to(item) if landed else None
+                self._lift_m = self._height_to_lift_to(item) if landed and self._vehicle.flies else None
             if self._lift_m is not None and motion.up_m < self._lift_m - 0.5 * HEIGHT_M:
                 return Aim(*self._start, self._lift_m, self.speed_m_s), reached
             self._lift_m = None

@@ -53,9 +53,9 @@ def mission_fault(flight: FlightState) -> str | None:
         return failed + "requires position"
     if len(items) < 2:
         return failed + "no mission"
-    # Armed on the ground it wants a take-off first, after delays at most (AUTO_OPTIONS bit 1 aside).
+    # Armed on the ground a copter wants a take-off first, after delays at most (AUTO_OPTIONS bit 1 aside).
     steering = [item.command for item in items[1:] if item.command <= NAV_LAST or item.command in LATER_NAV]
     first = next((command for command in steering if command != NAV_DELAY), None)
-    if flight.armed and flight.landed and first not in TAKE_OFFS:
+    if flight.vehicle.kind == "quad" and flight.armed and flight.landed and first not in TAKE_OFFS:
         return "Auto: Missing Takeoff Cmd"
     return None

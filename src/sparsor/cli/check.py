@@ -1,0 +1,57 @@
+"""`sparsor check`: what is wrong with a plan, before it is flown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sparsor.cli.console import Json, Verbose, print_json, quiet_option, reporting_as, warn
+
+
+@reporting_as("interrupted")
+def check(
+    plan: Annotated[
+        Path, typer.Argument(metavar="DIR|FILE.plan", help="A folder with plans, or a plan, ours or anybody's.")
+    ],
+    vehicle: Annotated[
+        str | None,
+        typer.Option(
+            "--vehicle",
+            help="quad, plane, vtol, rover, boat, or a profile of your own (.toml) (default: the mission's).",
+            metavar="NAME|FILE.toml",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: Json = False,
+    quiet: Annotated[bool, quiet_option("Print only the faults.")] = False,
+    verbose: Verbose = False,
+) -> None:
+    """Check a plan: limits, order, positions, legs against fences, home and rally points, endurance, edits.
+
+    Ends with 1 when it finds a fault. It knows no rules of the air, obstacles or terrain.
+
+    sparsor check missions/doha
+    """
+    del verbose
+    from sparsor.journeys.checking import check_plans
+
+    found = check_plans(plan, vehicle)
+    if as_json:
+        print_json(
+            {
+                "plans": [str(one) for one in found.plans],
+                "faults": list(found.faults),
+                "warnings": list(found.warnings),
+            }
+        )
+    else:
+        if not quiet:
+            warn(found.warnings)
+        for fault in found.faults:
+            typer.echo(fault)
+        if not quiet and not found.faults:
+            typer.echo(f"{', '.join(one.name for one in found.plans)}: no fault noticed")
+    if found.faults:
+        raise typer.Exit(1)
