@@ -53,10 +53,13 @@ def main() -> None:
     parser.add_argument("--atoms", type=int, default=256)
     parser.add_argument("--random-seeds", type=int, default=3, help="how many of the random splits")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--split", choices=("random", "blocked"), help="of a field, only this one")
     options = parser.parse_args()
     options.maps, options.side_m = options.flights, SIDE_M
     with ProcessPoolExecutor(options.workers) as pool:
         for protocol, cases in cases_of(options).items():
+            if options.split and not protocol.endswith(options.split):
+                continue
             print_maps(pool, protocol, cases, options)
         if options.faults:
             maps = fields(options.faults)

@@ -50,12 +50,15 @@ def main() -> None:
     parser.add_argument("--maps", type=int, default=400, help="most test maps a split")
     parser.add_argument("--iterations", type=int, default=DEFAULT_ITERATIONS)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--split", choices=("random", "blocked"), help="of a field, only this one")
     options = parser.parse_args()
     options.atoms, options.random_seeds, options.side_m = 64, 3, 2450.0  # the dictionary does not matter here
     print(f"| {' | '.join(COLUMNS)} |")
     print("|---" * len(COLUMNS) + "|")
     with ProcessPoolExecutor(options.workers) as pool:
         for protocol, cases in cases_of(options).items():
+            if options.split and not protocol.endswith(options.split):
+                continue
             for budget in BUDGETS:
                 for t90_s in T90_S:
                     jobs = [(case, budget, t90_s, options.iterations) for case in cases]
