@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from sparsor.core.cluster import workers_at
 from sparsor.core.workers import workers_of
 from sparsor.design import Weights, fixed_sparsity, search
 from sparsor.journeys import studying
@@ -82,6 +83,12 @@ def test_a_scoreboard_that_was_interrupted_is_the_one_that_was_not(source, rows,
     again = scoreboard(source, TINY, Store(tmp_path), workers=1)
     assert without_seconds(again) == without_seconds(rows)  # and two workers came to the same as one
     assert all(path.read_bytes() == content for path, content in kept.items())
+
+
+def test_processes_come_to_the_same_as_threads(source, rows, tmp_path):
+    with workers_at("local", 2) as hands:
+        found = scoreboard(source, replace(TINY, seeds=()), Store(tmp_path), workers=hands)
+    assert without_seconds(found) == without_seconds(row for row in rows if row["protocol"] == "blocked")
 
 
 def test_the_scoreboard_has_every_planner_decoder_protocol_noise_and_way_of_measuring(rows):

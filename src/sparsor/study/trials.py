@@ -94,9 +94,10 @@ def trial(
     pieces = [store.get(key) for key in keys]
     missing = [k for k, piece in enumerate(pieces) if piece is None]
     if missing:
-        shared = hands.share(_given(source, variant, number, settings, store))
-        for k, piece in zip(missing, hands.map(_evaluated, shared, [asked[k] for k in missing]), strict=True):
-            pieces[k] = store.put(keys[k], piece)
+        with one_blas_thread():  # around all threads, see `scoreboard`
+            shared = hands.share(_given(source, variant, number, settings, store))
+            for k, piece in zip(missing, hands.map(_evaluated, shared, [asked[k] for k in missing]), strict=True):
+                pieces[k] = store.put(keys[k], piece)
     return [piece or [] for piece in pieces]
 
 
