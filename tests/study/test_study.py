@@ -23,7 +23,7 @@ from sparsor.study.settings import StudySettings
 from sparsor.study.store import Store, code_hash, field_hash, versions
 from sparsor.study.summary import all_rows, by_length, headline, means
 from sparsor.study.tables import Table
-from sparsor.study.trials import Draws, Variant, problem_of, trial, winner
+from sparsor.study.trials import Draws, Variant, trial, trial_given, winner
 
 TINY = StudySettings(
     "tiny",
@@ -126,7 +126,7 @@ def test_tables_keep_every_digit_and_their_columns():
 def test_the_winner_of_a_trial_is_algorithm_1s(source, tmp_path):
     store, asked = Store(tmp_path), Draws(0.15, 3, 12)
     (samples,) = trial(source, Variant(), 0, [asked], TINY, store, workers_of(1))
-    problem = problem_of(source, Variant(), 0, TINY, store).problem
+    problem = trial_given(source, Variant(), 0, TINY, store).problem
     for weights in (Weights(), Weights(path=1e-2), Weights(incoherence=5.0)):
         best = search(problem, fixed_sparsity(0.15, 3), weights, seed=TINY.seed, iterations=12)
         won = winner(samples, weights)
