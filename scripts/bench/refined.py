@@ -222,7 +222,7 @@ def peer_routes(fold, options):
 
 def within(cells, kind, budget):
     """Return a peer's cells as a route, or nothing when it is too long: our 2-opt orders them where that is shorter."""
-    if kind == "ranking":
+    if kind.startswith("ranking"):
         return tour_within(cells, costs(budget, LEGS))
     tour = min([cells, shortest_path(cells, LEGS.length)], key=LEGS.path_length)
     return tour if tour.size > 1 and budget.used(tour, LEGS) <= budget.limit else None

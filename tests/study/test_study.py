@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from sparsor.core.cluster import workers_at
 from sparsor.core.workers import workers_of
 from sparsor.design import Weights, fixed_sparsity, search
 from sparsor.journeys import studying
@@ -22,7 +23,7 @@ from sparsor.study.settings import StudySettings
 from sparsor.study.store import Store, code_hash, field_hash, versions
 from sparsor.study.summary import all_rows, by_length, headline, means
 from sparsor.study.tables import Table
-from sparsor.study.trials import Draws, Variant, problem_of, trial, winner
+from sparsor.study.trials import Draws, Variant, trial, trial_given, winner
 
 TINY = StudySettings(
     "tiny",
@@ -84,6 +85,12 @@ def test_a_scoreboard_that_was_interrupted_is_the_one_that_was_not(source, rows,
     assert all(path.read_bytes() == content for path, content in kept.items())
 
 
+def test_processes_come_to_the_same_as_threads(source, rows, tmp_path):
+    with workers_at("local", 2) as hands:
+        found = scoreboard(source, replace(TINY, seeds=()), Store(tmp_path), workers=hands)
+    assert without_seconds(found) == without_seconds(row for row in rows if row["protocol"] == "blocked")
+
+
 def test_the_scoreboard_has_every_planner_decoder_protocol_noise_and_way_of_measuring(rows):
     assert {row["planner"] for row in rows} == set(PLANNERS)
     assert {row["decoder"] for row in rows} == {"kriging", "mmse", "blend", "lasso"}
@@ -119,7 +126,7 @@ def test_tables_keep_every_digit_and_their_columns():
 def test_the_winner_of_a_trial_is_algorithm_1s(source, tmp_path):
     store, asked = Store(tmp_path), Draws(0.15, 3, 12)
     (samples,) = trial(source, Variant(), 0, [asked], TINY, store, workers_of(1))
-    problem = problem_of(source, Variant(), 0, TINY, store).problem
+    problem = trial_given(source, Variant(), 0, TINY, store).problem
     for weights in (Weights(), Weights(path=1e-2), Weights(incoherence=5.0)):
         best = search(problem, fixed_sparsity(0.15, 3), weights, seed=TINY.seed, iterations=12)
         won = winner(samples, weights)

@@ -138,6 +138,6 @@ def _studied(
         rows=tuple(rows),
         figures=tuple(made),
         board=board_panels(rows, settings.noises),
-        claims=claims({one.name: one for one in made}),
+        claims=claims({one.name: one for one in made}, rows),
         example=example(source, settings, store),
     )

@@ -1,4 +1,4 @@
-"""Algorithm 1 against informative path planning (the paper's Fig. 11), and the curves of the whole scoreboard."""
+"""Algorithm 1 against informative path planning (the paper's `comp_IPP`), and the curves of the scoreboard."""
 
 from __future__ import annotations
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sparsor.study.protocol import OVERLAP_NOTE
+from sparsor.study.summary import by_length
 from sparsor.study.tables import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from sparsor.study.figures import Figure
 
+_TRAVEL = "travel below 10 % of a full-coverage path"
+_SHORT = 2  # of the path lengths on the scoreboard
 COVERAGE = 1023.0
 CELLS = 1024.0
 
@@ -26,16 +29,25 @@ class Checked(NamedTuple):
     holds: str
 
 
-def claims(figures: Mapping[str, Figure]) -> Table:
+def claims(figures: Mapping[str, Figure], rows: Sequence[dict[str, Any]]) -> Table:
     """Return the claims checked.
 
     Parameters
     ----------
     figures : mapping of str to Figure
         By name.
+    rows : sequence of dict
+        Of the scoreboard.
     """
     ipp = figures["against-ipp"]
-    checked = [*_travel(figures), *_dictionaries(figures), *_ipp(ipp), *_sparser(figures), *_offline()]
+    checked = [
+        *_travel(figures),
+        *_within_budget(rows),
+        *_dictionaries(figures),
+        *_ipp(ipp),
+        *_sparser(figures),
+        *_offline(),
+    ]
     return Table("The abstract's claims", Checked._fields, tuple(map(tuple, checked)), (OVERLAP_NOTE,))
 
 
@@ -44,12 +56,26 @@ def _travel(figures: Mapping[str, Figure]) -> list[Checked]:
     for suffix, words in _READINGS:
         numbers = figures[f"error-against-length{suffix}"].numbers
         length, cells = numbers["shortest_with"] / COVERAGE, numbers["cells"] / CELLS
-        claim = "travel below 10 % of a full-coverage path"
         where = f"p = 0.03, theta = 3, {words}"
         found += [
-            Checked(claim, f"path length over 1023 cell units, {where}", f"{length:.1%}", _yes(length < 0.1)),
-            Checked(claim, f"cells visited over 1024, {where}", f"{cells:.1%}", _yes(cells < 0.1)),
+            Checked(_TRAVEL, f"path length over 1023 cell units, {where}", f"{length:.1%}", _yes(length < 0.1)),
+            Checked(_TRAVEL, f"cells visited over 1024, {where}", f"{cells:.1%}", _yes(cells < 0.1)),
         ]
+    return found
+
+
+def _within_budget(rows: Sequence[dict[str, Any]]) -> list[Checked]:
+    found = []
+    for measured, decoder, words in (
+        ("sums", "lasso", "from its sums"),
+        ("legs", "blend", "cells under the legs, blend"),
+    ):
+        lines = by_length(rows, "relative", protocol="blocked", noise=0.0, measured=measured, decoder=decoder)
+        for length, error in lines.get("Algorithm 1", [])[:_SHORT]:
+            share = length / COVERAGE
+            value = f"{share:.1%}, |s - s'| / |s| = {error:.3f}"
+            where = f"path length, p and theta searched within a budget, blocked, {words}"
+            found.append(Checked(_TRAVEL, where, value, f"{_yes(share < 0.1)}, at this error"))
     return found
 
 

@@ -1,4 +1,4 @@
-"""An example: one test map, the routes over it, and what is reconstructed from them (the paper's Fig. 5 and 6)."""
+"""An example: a test map, routes over it, and what is reconstructed (the paper's `compar` and `pathrobot`)."""
 
 from __future__ import annotations
 

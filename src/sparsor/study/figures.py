@@ -112,7 +112,7 @@ class _Run:
 
 
 def against_length(run: _Run) -> Figure:
-    """Return error against path length over p, with and without Enhanced Sparsification (the paper's Fig. 4)."""
+    """Return error against path length, with and without Enhanced Sparsification (the paper's `res11`)."""
     asked = [Draws(p, theta, run.draws) for theta in (THETA, 0) for p in run.settings.probabilities]
     rows = _over_trials(run.trials(asked), asked)
     with_es, without = ([row for row in rows if row[1] == theta] for theta in (THETA, 0))
@@ -133,7 +133,7 @@ def against_length(run: _Run) -> Figure:
 
 
 def against_lambda(run: _Run, term: str) -> Figure:
-    """Return what a weight of the cost does to its term and to the error (the paper's Fig. 7 to 9)."""
+    """Return what a weight of the cost does to its term and to the error (the paper's `path1`, `err12`, `incoh3`)."""
     count = run.sweep_draws
     all_samples = [one[0] for one in run.trials([Draws(SWEEP_PROBABILITY, THETA, count)])]
     name = "length" if term == "path" else "incoherence"
@@ -176,7 +176,7 @@ def against_lambda(run: _Run, term: str) -> Figure:
 
 
 def dictionaries(run: _Run) -> Figure:
-    """Return error against path length by dictionary (the paper's Fig. 10)."""
+    """Return error against path length by dictionary (the paper's `vsdct`)."""
     asked = [Draws(p, THETA, run.draws) for p in run.settings.probabilities]
     table, series, errors = [], [], {}
     for name, label in (("learned", "learned"), ("dct", "DCT-II"), ("polynomial", "polynomial (Legendre)")):

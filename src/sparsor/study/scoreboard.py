@@ -106,10 +106,12 @@ def scoreboard(
         pieces = [store.get(key) for key in keys]
         missing = [k for k, piece in enumerate(pieces) if piece is None]
         if missing:
-            shared = hands.share(split_given(source, protocol, number, settings, store))
-            made = hands.map(_piece, shared, [parts[k] for k in missing])
-            for k, piece in zip(missing, made, strict=True):
-                pieces[k] = store.put(keys[k], piece)
+            # Around all threads: one that left it alone would give the others back their many threads of BLAS.
+            with one_blas_thread():
+                shared = hands.share(split_given(source, protocol, number, settings, store))
+                made = hands.map(_piece, shared, [parts[k] for k in missing])
+                for k, piece in zip(missing, made, strict=True):
+                    pieces[k] = store.put(keys[k], piece)
         rows += [{"protocol": protocol, "split": number, **row} for piece in pieces for row in piece or ()]
     progress("scoreboard", len(splits), len(splits))
     return rows

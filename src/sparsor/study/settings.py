@@ -59,8 +59,8 @@ class StudySettings:
     trials: tuple[int, ...] = (0, 1, 2)
     draws: int = 20
     sweep_draws: int = 200
-    paper_draws: int = 6
-    paper_sweep_draws: int = 24
+    paper_draws: int = 3
+    paper_sweep_draws: int = 16
     weights: tuple[float, ...] = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
     def of(self, *names: str) -> dict[str, object]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SHAPE = (32, 32)
 Dictionary = Literal["learned", "dct", "polynomial"]
 _DECIDING = ("seed", "rows", "lasso_maps")
+_PAPER_MAPS = 12  # that choose lambda, and half of the test maps: with K = 1024 a LASSO takes 50 times as long
 
 
 class Variant(NamedTuple):
@@ -52,7 +53,9 @@ class Draws(NamedTuple):
     samples: int
 
 
-class _Given(NamedTuple):
+class TrialGiven(NamedTuple):
+    """What the samples of a trial are given: the problem, the split's maps, what is taken off them, the seed."""
+
     problem: Problem
     sets: SplitMaps
     mean: NDArray[np.float64]
@@ -94,9 +97,10 @@ def trial(
     pieces = [store.get(key) for key in keys]
     missing = [k for k, piece in enumerate(pieces) if piece is None]
     if missing:
-        shared = hands.share(_given(source, variant, number, settings, store))
-        for k, piece in zip(missing, hands.map(_evaluated, shared, [asked[k] for k in missing]), strict=True):
-            pieces[k] = store.put(keys[k], piece)
+        with one_blas_thread():  # around all threads, see `scoreboard`
+            shared = hands.share(trial_given(source, variant, number, settings, store))
+            for k, piece in zip(missing, hands.map(_evaluated, shared, [asked[k] for k in missing]), strict=True):
+                pieces[k] = store.put(keys[k], piece)
     return [piece or [] for piece in pieces]
 
 
@@ -110,12 +114,8 @@ def winner(samples: Sequence[dict[str, Any]], weights: Weights) -> dict[str, Any
     return min(samples, key=cost)
 
 
-def problem_of(source: Source, variant: Variant, number: int, settings: StudySettings, store: Store) -> _Given:
+def trial_given(source: Source, variant: Variant, number: int, settings: StudySettings, store: Store) -> TrialGiven:
     """Return what Algorithm 1 is given in a trial, and the maps that judge it."""
-    return _given(source, variant, number, settings, store)
-
-
-def _given(source: Source, variant: Variant, number: int, settings: StudySettings, store: Store) -> _Given:
     sets = scaled(source.maps, random_split(source.maps, number))
     mean = np.zeros(sets.training.shape[1]) if variant.paper else sets.training.mean(axis=0)
     atoms, legs = variant.atoms(settings), unit_legs(SHAPE)
@@ -132,16 +132,17 @@ def _given(source: Source, variant: Variant, number: int, settings: StudySetting
         else:
             psi = (dct_dictionary if variant.dictionary == "dct" else polynomial_dictionary)(SHAPE, atoms)
         maps = sets.validation - mean
-        weight = choose_lasso_weight(psi, maps, legs, rows=settings.rows, seed=settings.seed)
+        judges = _evenly(maps, _PAPER_MAPS) if variant.paper else maps
+        weight = choose_lasso_weight(psi, judges, legs, rows=settings.rows, seed=settings.seed)
     problem = Problem(psi, maps, weight, legs, settings.rows, unit_rows=not variant.paper, improve=not variant.paper)
-    return _Given(problem, sets, mean, settings.seed, settings.lasso_maps)
+    return TrialGiven(problem, sets, mean, settings.seed, settings.lasso_maps // (2 if variant.paper else 1))
 
 
-def _evaluated(given: _Given, asked: Draws) -> list[dict[str, object]]:
+def _evaluated(given: TrialGiven, asked: Draws) -> list[dict[str, object]]:
     sparsity = fixed_sparsity(asked.probability, asked.theta)
     found: list[dict[str, object]] = []
     test = given.sets.test
-    truth = test[np.linspace(0, len(test) - 1, min(given.most_maps, len(test))).round().astype(int)]
+    truth = _evenly(test, given.most_maps)
     with one_blas_thread():
         for sample in range(asked.samples):
             one = evaluate(given.problem, sparsity, Weights(), rng=stream(given.seed, sample), sample=sample)
@@ -160,6 +161,10 @@ def _evaluated(given: _Given, asked: Draws) -> list[dict[str, object]]:
                 }
             )
     return found
+
+
+def _evenly(maps: NDArray[np.float64], most: int) -> NDArray[np.float64]:
+    return np.asarray(maps[np.linspace(0, len(maps) - 1, min(most, len(maps))).round().astype(int)])
 
 
 def from_sums(

@@ -8,6 +8,7 @@ import numpy as np
 
 from sparsor.design.refined.costs import costs
 from sparsor.design.refined.starts import tour_within
+from sparsor.design.route import shortest_path
 from sparsor.errors import BudgetError
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ def random_tour(legs: LegTable, budget: Budget, rng: np.random.Generator) -> NDA
 def qr_pivot_tour(maps: NDArray[np.float64], legs: LegTable, budget: Budget) -> NDArray[np.int64]:
     """Return the tour of as many of the QR pivots of the maps' modes as fit.
 
+    As many modes are taken as cells can be visited: r cells tell r modes, and pivots for many more are led by modes
+    that nobody could tell.
+
     Parameters
     ----------
     maps : array of float64 (n, N)
@@ -50,8 +54,13 @@ def qr_pivot_tour(maps: NDArray[np.float64], legs: LegTable, budget: Budget) -> 
     BudgetError
         When not even two of them fit.
     """
-    order = qr_pivots(modes(maps))
-    return _toured(order[legs.allowed[order]], legs, budget)
+    basis = modes(maps)
+    low, high = 2, basis.shape[1]
+    while low < high:
+        middle = (low + high + 1) // 2
+        tour = shortest_path(_allowed_pivots(basis, middle, legs)[:middle], legs.length)
+        low, high = (middle, high) if budget.used(tour, legs) <= budget.limit else (low, middle - 1)
+    return _toured(_allowed_pivots(basis, low, legs), legs, budget)
 
 
 def modes(maps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -84,6 +93,11 @@ def qr_pivots(basis: NDArray[np.float64]) -> NDArray[np.int64]:
         order.append(left[pivot])
         left = np.delete(left, pivot)
     return np.concatenate(order).astype(np.int64)
+
+
+def _allowed_pivots(basis: NDArray[np.float64], count: int, legs: LegTable) -> NDArray[np.int64]:
+    order = qr_pivots(basis[:, :count])
+    return order[legs.allowed[order]]
 
 
 def _toured(ranking: NDArray[np.int64], legs: LegTable, budget: Budget) -> NDArray[np.int64]:
