@@ -226,6 +226,19 @@ def plan(
         tuple[float, float] | None,
         _option(FLIGHT, "Wind to plan for: m/s, and where it comes from.", "--wind", metavar="SPEED FROM_DEG"),
     ] = None,
+    keep_out: Annotated[
+        list[Path] | None,
+        _option(
+            FLIGHT,
+            "GeoJSON or KML of what not to fly over: polygons, and circles as points with radius_m; repeatable.",
+            "--keep-out",
+            metavar="FILE",
+        ),
+    ] = None,
+    keep_out_margin: Annotated[
+        float | None,
+        _option(FLIGHT, "Least distance to a keep-out, m (default: 30).", "--keep-out-margin", metavar="M"),
+    ] = None,
     sensor_profile: Annotated[
         str | None,
         _option(
@@ -285,6 +298,8 @@ def plan(
             "home": home,
             "home_altitude_m": home_altitude,
             "wind": wind,
+            "keep_out": tuple(keep_out) if keep_out else None,
+            "keep_out_margin_m": keep_out_margin,
         },
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},

@@ -136,4 +136,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         },
         plans=hashes,
         sensor=mission.sensor,
+        passing=tuple((plan.items[index].lon_deg, plan.items[index].lat_deg) for index in plan.passing),
     )

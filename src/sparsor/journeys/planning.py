@@ -5,29 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
 from sparsor.design import Weights
 from sparsor.design.expectation import expected_errors
 from sparsor.errors import MissionError
-from sparsor.geodesy.lengths import distance_m
+from sparsor.geodesy.lengths import distance_m, path_length_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
-from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan
+from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan, transits
 from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
     from sparsor.mission.specification import MissionSpecification
 
+_STRAIGHT = (
+    "A failsafe return flies straight home or to the rally point, through what is kept out of if that lies between: "
+    "the exclusion fences do not lead it past."
+)
 _INTERRUPTED = "The search was interrupted: the route is the best that it had found by then."
 
 
@@ -177,9 +182,10 @@ def _assemble(
         hold_s=_holds_s(flight.hold_s, candidate, prepared.autopilot),
         fence_margin_m=flight.fence_margin_m,
         wind=prepared.wind,
+        zones=place.zones,
     )
     path_m = legs.path_length(stops)
-    transit = distance_m(plan.home.lon_deg, plan.home.lat_deg, lon[[0, -1]], lat[[0, -1]]).sum()
+    transit = sum(path_length_m(*np.transpose(way)) for way in transits(plan))
     time = time_plan(plan, vehicle, prepared.wind)
     mission = PlannedMission(
         specification=spec,
@@ -200,7 +206,8 @@ def _assemble(
         warnings=(),
     )
     _check(mission, prepared.wind)
-    return replace(mission, warnings=(*warnings, *advice(mission), *plan.warnings, *prior.warnings))
+    said = (*warnings, *advice(mission), *plan.warnings, *prior.warnings)
+    return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
 
 def _check(mission: PlannedMission, wind: SteadyWind) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sparsor.mission import transits
 from sparsor.plot import MissionPicture, mission_preview
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             prior_unit=mission.prior.model.unit,
             stops=stops,
             route=stops,
-            transits=(np.stack([home, stops[0]]), np.stack([stops[-1], home])),
+            transits=tuple(np.array(way) for way in transits(plan)),
             home=(float(home[0]), float(home[1])),
             fence=np.column_stack([fence.lon_deg, fence.lat_deg]),
             area=() if place.area is None else _rings(mission),
