@@ -170,6 +170,7 @@ class FlightSection(_Section):
     home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
     wind: tuple[FiniteFloat, FiniteFloat] | None = None
+    sorties: bool = False
     keep_out: tuple[Path, ...] = ()
     keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
 
