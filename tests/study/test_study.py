@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from sparsor.core.cluster import workers_at
+from sparsor.core.schedulers import workers_at
 from sparsor.core.workers import workers_of
 from sparsor.design import Weights, fixed_sparsity, search
 from sparsor.journeys import studying

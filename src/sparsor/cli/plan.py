@@ -226,6 +226,27 @@ def plan(
         tuple[float, float] | None,
         _option(FLIGHT, "Wind to plan for: m/s, and where it comes from.", "--wind", metavar="SPEED FROM_DEG"),
     ] = None,
+    sorties: Annotated[
+        bool,
+        typer.Option(
+            "--sorties",
+            help="Cut a route beyond one battery into flights from home and back, NAME-1.plan, NAME-2.plan ...",
+            rich_help_panel=FLIGHT,
+        ),
+    ] = False,
+    keep_out: Annotated[
+        list[Path] | None,
+        _option(
+            FLIGHT,
+            "GeoJSON or KML of what not to fly over: polygons, and circles as points with radius_m; repeatable.",
+            "--keep-out",
+            metavar="FILE",
+        ),
+    ] = None,
+    keep_out_margin: Annotated[
+        float | None,
+        _option(FLIGHT, "Least distance to a keep-out, m (default: 30).", "--keep-out-margin", metavar="M"),
+    ] = None,
     sensor_profile: Annotated[
         str | None,
         _option(
@@ -285,6 +306,9 @@ def plan(
             "home": home,
             "home_altitude_m": home_altitude,
             "wind": wind,
+            "sorties": sorties or None,
+            "keep_out": tuple(keep_out) if keep_out else None,
+            "keep_out_margin_m": keep_out_margin,
         },
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},
@@ -313,7 +337,7 @@ def plan(
     # What says that a mission cannot fly, or is a slip, is said even to those who asked for quiet.
     warn(advice(mission) if talk is Talk.QUIET else mission.warnings)
     if talk is Talk.QUIET:
-        typer.echo(written[f"{spec.name}.plan"])
+        typer.echo("\n".join(str(written[file]) for file in mission.plan_files))
         return
     print_table(mission_rows(mission, details=talk is Talk.VERBOSE), spec.name)
     if curve:

@@ -15,7 +15,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
     """Return what --json prints; SI units in the key names."""
     spec, found = mission.specification, mission.candidate
     return {
-        "plans": [str(folder / f"{spec.name}.plan")],
+        "plans": [str(folder / file) for file in mission.plan_files],
         "sidecar": str(folder / f"{spec.name}.npz"),
         "stops": int(found.stops.size),
         "cells_measured": int(found.phi.any(axis=0).sum()),
@@ -28,7 +28,8 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "endurance_used_s": mission.used_s,
         "endurance_s": mission.vehicle.endurance_s,
         "flyable": mission.flyable,
-        "sorties": 1,
+        "sorties": len(mission.plans),
+        "sortie_times_s": [time.seconds for time in mission.sorties.times] if mission.sorties else [],
         "expected_relative_error": mission.expected_relative_error,
         "expected_relative_error_cells": mission.expected_relative_error_cells,
         "planner": spec.search.planner,
@@ -64,7 +65,7 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{mission.flight_time_s / 60:.1f} min{_of_the_battery(mission)}; {vehicle.name}: "
             f"{vehicle.endurance_s / 60:.0f} min endurance, {mission.usable_s / 60:.0f} min less reserve",
         ),
-        ("flyable", "yes, by endurance" if mission.flyable else "no: a planning study (see the warnings)"),
+        ("flyable", _flyable(mission)),
         (
             "expected error",
             f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
@@ -105,6 +106,20 @@ def _stops(mission: PlannedMission) -> str:
     holds_s = [stop.hold_s for stop in mission.plan.stops if stop.hold_s > 0]
     dwells = f"; {sum(holds_s):g} s of dwelling at {len(holds_s)} of them" if holds_s else ", none dwelt at"
     return f"{stops} turning points{dwells}; {over} cells flown over and measured"
+
+
+def _flyable(mission: PlannedMission) -> str:
+    if not mission.flyable:
+        return "no: a planning study (see the warnings)"
+    if mission.sorties is None:
+        return "yes, by endurance"
+    if len(mission.plans) == 1:
+        return f"yes, by endurance, in another order: {mission.sorties.times[0].seconds / 60:.1f} min"
+    return (
+        f"in {len(mission.plans)} sorties: "
+        + ", ".join(f"{one.seconds / 60:.1f}" for one in mission.sorties.times)
+        + " min"
+    )
 
 
 def _of_the_battery(mission: PlannedMission) -> str:

@@ -64,9 +64,15 @@ class LegTable:
                     _mark_offset(table, open_cells, down, across)
         return table.reshape(self.size, self.size)
 
-    def kept_inside(self) -> LegTable:
-        """Return the table with every leg that leaves the allowed cells longer than any path of the others."""
-        closed = ~self.passable
+    def kept_inside(self, barred: NDArray[np.bool_] | None = None) -> LegTable:
+        """Return the table with every leg that may not be flown longer than any path of the others.
+
+        Parameters
+        ----------
+        barred : array of bool (N, N), optional
+            Legs that may not be flown beside those that leave the allowed cells, symmetric.
+        """
+        closed = ~self.passable if barred is None else ~self.passable | barred
         if not closed.any():
             return self
         longest = self.size * float(self.length.max())

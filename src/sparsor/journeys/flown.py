@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -151,7 +151,7 @@ def _stops_now(plans: Mapping[str, Path], sidecar: Sidecar) -> tuple[NDArray[np.
     if not edited:
         return sidecar.stops, ()
     try:
-        flown = [stops_in_order(read_plan(path), sidecar.grid) for path in plans.values()]
+        flown = [stops_in_order(with_passing(read_plan(path), sidecar), sidecar.grid) for path in plans.values()]
     except MissionError as error:
         return sidecar.stops, (f"{edited} was changed and cannot be read: the stops are as planned ({error}).",)
     return np.concatenate(flown), (
@@ -212,8 +212,16 @@ def stops_in_order(plan: MissionPlan, grid: Grid) -> NDArray[np.int64]:
     return np.array(list(dict.fromkeys(cells[cells >= 0].tolist())), dtype=np.int64)
 
 
+def with_passing(plan: MissionPlan, sidecar: Sidecar) -> MissionPlan:
+    """Return a plan that was read with what its sidecar knows: which waypoints only lead past a keep-out."""
+    places = set(sidecar.passing)
+    known = tuple(index for index, item in enumerate(plan.items) if (item.params[5], item.params[4]) in places)
+    return replace(plan, passing=known)
+
+
 def plan_changes(plan: MissionPlan, sidecar: Sidecar) -> tuple[str, ...]:
     """Say in words how the stops of an edited plan differ from the planned ones, as far as the sidecar tells."""
+    plan = with_passing(plan, sidecar)
     if len(sidecar.plans) > 1:
         return ()  # one of several sorties: which stops were its own is not known
     now, then = stops_in_order(plan, sidecar.grid), sidecar.stops

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sparsor.core.files import write_files
 from sparsor.errors import MissionError
@@ -79,9 +82,11 @@ def write_mission(
         When the folder cannot be written.
     """
     spec = mission.specification
-    contents = {SPECIFICATION_FILE: specification_toml(spec, folder), f"{spec.name}.plan": plan_bytes(mission.plan)}
-    for export in spec.output.export:
-        contents[f"{spec.name}.{export}"] = export_bytes(mission.plan, spec.name, export)
+    contents = {SPECIFICATION_FILE: specification_toml(spec, folder)}
+    for file, plan in zip(mission.plan_files, mission.plans, strict=True):
+        contents[file] = plan_bytes(plan)
+        stem = file.removesuffix(".plan")
+        contents |= {f"{stem}.{export}": export_bytes(plan, stem, export) for export in spec.output.export}
     hashes = {file: content_hash(content) for file, content in contents.items() if file.endswith(".plan")}
     contents[f"{spec.name}.npz"] = sidecar_npz(_sidecar(mission, hashes))
     if preview:
@@ -107,19 +112,23 @@ def _files(spec: MissionSpecification) -> set[str]:
 def _files_before(folder: Path) -> set[str]:
     """Return the names of the files of the mission that is in a folder now, by its own specification."""
     with suppress(MissionError):
-        return _files(read_specification(folder / SPECIFICATION_FILE))
+        spec = read_specification(folder / SPECIFICATION_FILE)
+        sortie = re.compile(rf"{re.escape(spec.name)}-\d+\.({'|'.join(('plan', *spec.output.export))})")
+        return _files(spec) | {path.name for path in folder.iterdir() if sortie.fullmatch(path.name)}
     return set()
 
 
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
     plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
+    passed = [(one.items[index].lon_deg, one.items[index].lat_deg) for one in mission.plans for index in one.passing]
+    flown = mission.sorties
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
         allowed=mission.place.allowed,
         model=mission.prior.model,
         phi=candidate.phi,
-        stops=candidate.stops,
+        stops=candidate.stops if flown is None else candidate.stops[np.concatenate(flown.orders)],
         altitude_m=flight.altitude_m,
         hold_s=max(stop.hold_s for stop in plan.stops),
         home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
@@ -135,4 +144,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         },
         plans=hashes,
         sensor=mission.sensor,
+        passing=tuple(passed),
     )

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from sparsor.errors import MissionError
-from sparsor.journeys.flown import is_edited, plan_changes, sidecar_of
+from sparsor.journeys.flown import is_edited, plan_changes, sidecar_of, with_passing
 from sparsor.journeys.loginspection import inspect_log
 from sparsor.mission import describe_plan, read_plan
 from sparsor.mission.sidecar import read_sidecar
@@ -72,9 +72,10 @@ def inspect_file(path: Path) -> Inspection:
 
 
 def _plan(path: Path) -> Inspection:
-    plan = read_plan(path)
+    plan, sidecar = read_plan(path), sidecar_of(path)
+    if sidecar is not None:
+        plan = with_passing(plan, sidecar)
     description = describe_plan(plan)
-    sidecar = sidecar_of(path)
     edited = None if sidecar is None else is_edited(path, sidecar)
     changes = plan_changes(plan, sidecar) if edited and sidecar is not None else ()
     lines = [f"{path}: a QGroundControl plan", *description.lines]

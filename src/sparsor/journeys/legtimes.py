@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.geodesy import Grid
+    from sparsor.journeys.preparing import Place
+
+DETOUR_SHARE = 1e-3  # the plane's metres differ from the geodesic's by less
+DETOUR_TURNS = 4
+NO_WAY_M = 1e8
 
 
 def leg_seconds_between(
@@ -41,14 +46,26 @@ def leg_seconds_between(
 
 
 def home_seconds(
-    grid: Grid, home: tuple[float, float], vehicle: Vehicle, speed_m_s: float, wind: SteadyWind
+    place: Place, home: tuple[float, float], vehicle: Vehicle, speed_m_s: float, wind: SteadyWind
 ) -> NDArray[np.float64]:
-    """Return the seconds between home and each cell, (N,), as `leg_seconds_between` counts them."""
-    lon, lat = grid.centres_deg()
+    """Return the seconds between home and each cell, (N,), as `leg_seconds_between` counts them.
+
+    A way past a keep-out counts as if it were flown against the wind, which is the most it takes.
+    """
+    lon, lat = place.grid.centres_deg()
     length_m = distance_m(*home, lon, lat)
     east, north = LocalPlane(*home).metres(lon, lat).T
     turning_s = turn_seconds(vehicle, math.pi, speed_m_s)
-    return both_ways(length_m, np.degrees(np.arctan2(east, north)), vehicle, speed_m_s, wind) + turning_s
+    straight_s = both_ways(length_m, np.degrees(np.arctan2(east, north)), vehicle, speed_m_s, wind) + turning_s
+    if place.zones is None:
+        return straight_s
+    way_m = place.zones.lengths_m(home, lon, lat)
+    round_about = way_m > length_m * (1.0 + DETOUR_SHARE)
+    against_m_s = speed_m_s - (wind.speed_m_s if vehicle.flies else 0.0)
+    farthest = np.isfinite(way_m)
+    # A cell without a way home is as far as no budget reaches.
+    slow_s = np.where(farthest, way_m, NO_WAY_M) / against_m_s + DETOUR_TURNS * turning_s
+    return np.where(round_about, slow_s, straight_s)
 
 
 def both_ways(

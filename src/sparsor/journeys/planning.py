@@ -5,29 +5,35 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
 from sparsor.design import Weights
 from sparsor.design.expectation import expected_errors
 from sparsor.errors import MissionError
-from sparsor.geodesy.lengths import distance_m
+from sparsor.geodesy.lengths import distance_m, path_length_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
-from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan
+from sparsor.journeys.sorties import Sorties, cut_into_sorties
+from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan, transits
 from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
     from sparsor.mission.specification import MissionSpecification
 
+_STRAIGHT = (
+    "A failsafe return flies straight home or to the rally point, through what is kept out of if that lies between: "
+    "the exclusion fences do not lead it past."
+)
 _INTERRUPTED = "The search was interrupted: the route is the best that it had found by then."
 
 
@@ -62,6 +68,9 @@ class PlannedMission:
     expected_relative_error_cells : float
         The same, decoded from the single cells.
     warnings : tuple of str
+    sorties : Sorties or None
+        The flights that the route is cut into, where one is not enough and they were asked for; length, times and
+        errors above are of the uncut route.
     """
 
     specification: MissionSpecification
@@ -80,6 +89,7 @@ class PlannedMission:
     expected_relative_error: float
     expected_relative_error_cells: float
     warnings: tuple[str, ...]
+    sorties: Sorties | None = None
 
     @property
     def usable_s(self) -> float:
@@ -88,8 +98,21 @@ class PlannedMission:
 
     @property
     def flyable(self) -> bool:
-        """Whether the flight fits into the vehicle's endurance less its reserve."""
-        return self.used_s <= self.usable_s
+        """Whether the flight, or each of its sorties, fits into the vehicle's endurance less its reserve."""
+        return self.used_s <= self.usable_s or self.sorties is not None
+
+    @property
+    def plans(self) -> tuple[MissionPlan, ...]:
+        """What is written: the plan, or those of its sorties."""
+        return (self.plan,) if self.sorties is None else self.sorties.plans
+
+    @property
+    def plan_files(self) -> tuple[str, ...]:
+        """The plans' file names: NAME.plan, or NAME-1.plan ... of sorties."""
+        name = self.specification.name
+        if len(self.plans) == 1:
+            return (f"{name}.plan",)
+        return tuple(f"{name}-{number}.plan" for number in range(1, len(self.plans) + 1))
 
     @property
     def coverage_fraction(self) -> float:
@@ -166,20 +189,27 @@ def _assemble(
     candidate = _nearer_end_first(spec, place, candidate)
     flight, stops = spec.flight, candidate.stops
     lon, lat = place.grid.centres_deg(stops)
-    plan = build_mission(
-        lon,
-        lat,
-        vehicle=vehicle,
-        autopilot=prepared.autopilot,
-        altitude_m=flight.altitude_m,
-        home=_home(spec, float(lon[0]), float(lat[0])),
-        speed_m_s=flight.speed_m_s,
-        hold_s=_holds_s(flight.hold_s, candidate, prepared.autopilot),
-        fence_margin_m=flight.fence_margin_m,
-        wind=prepared.wind,
-    )
+    holds_s = np.broadcast_to(_holds_s(flight.hold_s, candidate, prepared.autopilot), stops.shape)
+    home = _home(spec, float(lon[0]), float(lat[0]))
+
+    def build(order: NDArray[np.int64]) -> MissionPlan:
+        return build_mission(
+            lon[order],
+            lat[order],
+            vehicle=vehicle,
+            autopilot=prepared.autopilot,
+            altitude_m=flight.altitude_m,
+            home=home,
+            speed_m_s=flight.speed_m_s,
+            hold_s=holds_s[order],
+            fence_margin_m=flight.fence_margin_m,
+            wind=prepared.wind,
+            zones=place.zones,
+        )
+
+    plan = build(np.arange(stops.size))
     path_m = legs.path_length(stops)
-    transit = distance_m(plan.home.lon_deg, plan.home.lat_deg, lon[[0, -1]], lat[[0, -1]]).sum()
+    transit = sum(path_length_m(*np.transpose(way)) for way in transits(plan))
     time = time_plan(plan, vehicle, prepared.wind)
     mission = PlannedMission(
         specification=spec,
@@ -199,15 +229,39 @@ def _assemble(
         expected_relative_error_cells=expected[1] * prior.widening,
         warnings=(),
     )
+    if flight.sorties and not mission.flyable:
+        cut = cut_into_sorties(prepared, stops, np.asarray(holds_s, dtype=np.float64), build, spec.search.seed)
+        if isinstance(cut, str):
+            warnings = (*warnings, cut)
+        else:
+            mission = replace(mission, sorties=cut)
+            warnings = (*warnings, _said_of(cut, mission))
     _check(mission, prepared.wind)
-    return replace(mission, warnings=(*warnings, *advice(mission), *plan.warnings, *prior.warnings))
+    said = (*warnings, *advice(mission), *plan.warnings, *prior.warnings)
+    return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
 
 def _check(mission: PlannedMission, wind: SteadyWind) -> None:
     """Refuse a flyable plan that `sparsor check` would fail."""
-    faults = [fault.sentence for fault in check_faults(mission.plan, mission.vehicle, wind) if fault.fails]
+    found = [fault for plan in mission.plans for fault in check_faults(plan, mission.vehicle, wind)]
+    faults = [fault.sentence for fault in found if fault.fails]
     if mission.flyable and faults:
         raise MissionError(f"the plan fails its checks and is not written: {' '.join(faults)}")
+
+
+def _said_of(cut: Sorties, mission: PlannedMission) -> str:
+    together_s = sum(time.seconds for time in cut.times)
+    if len(cut.plans) == 1:
+        return (
+            f"The route as it was found takes more than one battery; its stops in another order take "
+            f"{cut.times[0].used_s / 60:.1f} of {mission.usable_s / 60:.1f} min. The expected error is that of the "
+            "route as it was found."
+        )
+    return (
+        f"One battery is not enough for the route: it is cut into {len(cut.plans)} sorties, {together_s / 60:.0f} min "
+        f"in all, none above {max(time.used_s for time in cut.times) / 60:.1f} of {mission.usable_s / 60:.1f} min. The "
+        "expected error is that of the uncut route."
+    )
 
 
 def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candidate) -> Candidate:

@@ -13,6 +13,7 @@ from sparsor.design.sparsity import check_sparsity
 from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
+from sparsor.journeys.keepingout import barred_legs, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.mission.specification import PAPER_ROWS
@@ -34,17 +35,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.core.workers import Workers
+    from sparsor.geodesy.zones import Zones
     from sparsor.mission.specification import MissionSpecification
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a mission is flown: the grid, the area it was asked for, the cells inside."""
+    """Where a mission is flown: the grid, the area it was asked for, the cells inside, what is kept out of."""
 
     grid: Grid
     area: Area | None
     allowed: NDArray[np.bool_]
     full_coverage_m: float
+    zones: Zones | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Prepared:
             return Budget(asked.value, "distance")
         home = None
         if spec.flight.home is not None:
-            home = home_seconds(self.place.grid, spec.flight.home, self.vehicle, self.speed_m_s, self.wind)
+            home = home_seconds(self.place, spec.flight.home, self.vehicle, self.speed_m_s, self.wind)
         fixed = flight_seconds(
             self.vehicle,
             path_length_m=0.0,
@@ -139,7 +142,8 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     autopilot, sensor = autopilot_named(spec.flight.autopilot), _sensor(spec)
     box, area = _where(spec)
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
-    place = _place(Grid(box, prior.model.shape), area)
+    grid = Grid(box, prior.model.shape)
+    place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot))
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
     wind = spec.flight.steady_wind
     check_wind(vehicle, wind, speed)
@@ -163,15 +167,19 @@ def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
     return area.box, None if area.is_box else area
 
 
-def _place(grid: Grid, area: Area | None) -> Place:
+def _place(grid: Grid, area: Area | None, zones: Zones | None) -> Place:
     allowed = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
+    if zones is not None:
+        allowed = allowed & ~zones.holds(*grid.centres_deg())
     if int(allowed.sum()) < 2:
-        raise MissionError("the area holds the centre of one cell only; draw a larger one")
-    return Place(grid, area, allowed, grid.full_coverage_m(allowed))
+        kept = " outside of what is kept out of" if zones is not None else ""
+        raise MissionError(f"the area holds the centre of one cell at most{kept}; draw a larger one")
+    return Place(grid, area, allowed, grid.full_coverage_m(allowed), zones)
 
 
 def _legs(place: Place, vehicle: Vehicle, speed_m_s: float, wind: SteadyWind) -> LegTable:
     length_m = place.grid.lengths_m()
     cell_unit_m = place.full_coverage_m / (int(place.allowed.sum()) - 1)
     seconds = leg_seconds_between(place.grid, length_m, vehicle, speed_m_s, wind)
-    return LegTable(place.grid.shape, length_m, seconds, cell_unit_m, place.allowed).kept_inside()
+    table = LegTable(place.grid.shape, length_m, seconds, cell_unit_m, place.allowed)
+    return table.kept_inside(None if place.zones is None else barred_legs(place.zones, place.grid, place.allowed))

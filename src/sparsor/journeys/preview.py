@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sparsor.mission import transits
 from sparsor.plot import MissionPicture, mission_preview
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ def preview_png(mission: PlannedMission) -> bytes:
             prior_label=label,
             prior_unit=mission.prior.model.unit,
             stops=stops,
-            route=stops,
-            transits=(np.stack([home, stops[0]]), np.stack([stops[-1], home])),
+            route=stops if mission.sorties is None else None,
+            transits=_ways(mission),
             home=(float(home[0]), float(home[1])),
             fence=np.column_stack([fence.lon_deg, fence.lat_deg]),
             area=() if place.area is None else _rings(mission),
@@ -41,6 +42,17 @@ def preview_png(mission: PlannedMission) -> bytes:
             caption=_caption(mission),
         )
     )
+
+
+def _ways(mission: PlannedMission) -> tuple[NDArray[np.float64], ...]:
+    """Return the ways from and to home; of sorties each whole flight."""
+    if mission.sorties is None:
+        return tuple(np.array(way) for way in transits(mission.plan))
+    flights = []
+    for plan in mission.plans:
+        out, back = transits(plan)
+        flights.append(np.array([*out, *((stop.lon_deg, stop.lat_deg) for stop in plan.stops[1:]), *back[1:]]))
+    return tuple(flights)
 
 
 def _prior_map(mission: PlannedMission) -> tuple[NDArray[np.float64], str]:

@@ -10,7 +10,7 @@ from sparsor.mission.fault import Fault
 from sparsor.mission.faults import judged_faults, plan_faults
 from sparsor.mission.fence import fence_around
 from sparsor.mission.items import MissionItem
-from sparsor.mission.plan import Circle, ComplexItem, Fence, Home, MissionPlan, RallyPoint
+from sparsor.mission.plan import Circle, ComplexItem, Fence, Home, MissionPlan, RallyPoint, transits
 from sparsor.mission.reader import parse_plan, read_plan
 from sparsor.mission.timing import FlightTime, time_plan
 from sparsor.mission.vehiclefaults import check_faults, vehicle_faults
@@ -40,5 +40,6 @@ __all__ = [
     "plan_faults",
     "read_plan",
     "time_plan",
+    "transits",
     "vehicle_faults",
 ]

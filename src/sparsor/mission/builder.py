@@ -11,16 +11,21 @@ import numpy as np
 from sparsor.errors import MissionError
 from sparsor.mission.advice import build_warnings
 from sparsor.mission.fence import MAX_CORNERS, fence_around
+from sparsor.mission.items import NAV_LOITER_TIME, WAYPOINTS
+from sparsor.mission.keepouts import exclusion_circles, exclusions, free_ends, ways_past
 from sparsor.mission.plan import Home, MissionPlan, RallyPoint
-from sparsor.mission.sequences import BESIDE_STOPS, ends_of, flight_items, room_of
+from sparsor.mission.sequences import BESIDE_STOPS, flight_items, room_of
 from sparsor.mission.timing import time_plan
 from sparsor.vehicle import CALM, Autopilot, SteadyWind, Vehicle, autopilot_named, check_wind
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from sparsor.geodesy.zones import Zones
+
 # An autopilot stores positions as integers of 1e-7 degrees: what is written is what is flown.
 DECIMALS = 7
+SURVEY = WAYPOINTS | {NAV_LOITER_TIME}
 MAX_SPEED_M_S = 200.0
 MAX_ALTITUDE_M = 20_000.0
 
@@ -37,6 +42,7 @@ def build_mission(
     hold_s: ArrayLike = 0.0,
     fence_margin_m: float = 50.0,
     wind: SteadyWind = CALM,
+    zones: Zones | None = None,
 ) -> MissionPlan:
     """Turn a route into a plan that its kind of vehicle flies from take-off to landing.
 
@@ -62,6 +68,9 @@ def build_mission(
         Least distance between the flight and its fence, metres; of a plane and a VTOL beside the room that it turns in.
     wind : SteadyWind
         A plane and a VTOL take off and land against it.
+    zones : Zones, optional
+        What is kept out of: the ways from and to home lead past it, and it is written as exclusion fences. The legs
+        between stops are the caller's.
 
     Returns
     -------
@@ -81,15 +90,16 @@ def build_mission(
     check_wind(vehicle, wind, speed)
     altitude = _checked_altitude(altitude_m, vehicle)
     holds = _checked_holds(hold_s, lon.size, facts)
-    _check_count(lon.size, facts, vehicle)
 
     base = (home.lon_deg, home.lat_deg)
-    path = [base, *zip(lon.tolist(), lat.tolist(), strict=True), base]
+    stops = list(zip(lon.tolist(), lat.tolist(), strict=True))
     ends = None
     if vehicle.circles:
-        ends = ends_of(base, path[1], path[-2], vehicle=vehicle, altitude_m=altitude, wind=wind)
-        path += room_of(ends, vehicle)
+        ends = free_ends(base, stops[0], stops[-1], vehicle=vehicle, altitude_m=altitude, wind=wind, zones=zones)
         fence_margin_m += 2.0 * vehicle.turn_radius_m
+    outbound, homebound = ways_past(zones, base, stops[0], stops[-1], ends, lifts=vehicle.lifts)
+    _check_count(lon.size + len(outbound) + len(homebound), facts, vehicle)
+    path = [base, *outbound, *stops, *homebound, base, *([] if ends is None else room_of(ends, vehicle))]
     items = flight_items(
         list(zip(lon.tolist(), lat.tolist(), holds, strict=True)),
         base,
@@ -98,13 +108,19 @@ def build_mission(
         altitude_m=altitude,
         speed_m_s=speed,
         ends=ends,
+        outbound=outbound,
+        homebound=homebound,
     )
+    first = next(index for index, item in enumerate(items) if item.command in SURVEY)
+    last = first + len(outbound) + len(stops)
     path_lon, path_lat = np.array(path).T
     fence = fence_around(path_lon, path_lat, fence_margin_m, min(MAX_CORNERS, facts.max_fence_points))
     plan = MissionPlan(
         items=items,
         home=home,
-        fences=(fence,),
+        fences=(fence, *exclusions(zones)),
+        circles=exclusion_circles(zones),
+        passing=(*range(first, first + len(outbound)), *range(last, last + len(homebound))),
         rally_points=(RallyPoint(home.lon_deg, home.lat_deg, altitude),),
         firmware_type=facts.firmware_type,
         vehicle_type=vehicle.mav_type,

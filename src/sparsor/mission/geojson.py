@@ -34,6 +34,10 @@ def geojson_bytes(plan: MissionPlan, name: str) -> bytes:
         _point("home", plan.home.lon_deg, plan.home.lat_deg, {"altitude_amsl_m": _home_altitude(plan)}),
         *(_fence(fence) for fence in plan.fences),
         *(
+            _point("fence", one.lon_deg, one.lat_deg, {"inclusion": one.inclusion, "radius_m": number(one.radius_m)})
+            for one in plan.circles
+        ),
+        *(
             _point("rally", point.lon_deg, point.lat_deg, {"altitude_above_home_m": number(point.altitude_m)})
             for point in plan.rally_points
         ),

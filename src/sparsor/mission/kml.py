@@ -5,15 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import fastkml
+import numpy as np
 import pygeoif
 from fastkml import geometry
 from fastkml.enums import AltitudeMode
 
+from sparsor.geodesy.plane import LocalPlane
 from sparsor.mission.items import FRAME_GLOBAL
+from sparsor.mission.plan import Fence
 
 if TYPE_CHECKING:
     from sparsor.mission.items import MissionItem
-    from sparsor.mission.plan import Fence, MissionPlan
+    from sparsor.mission.plan import Circle, MissionPlan
 
 DECIMALS = 9
 # Alpha, blue, green, red: orange route, red fence.
@@ -35,6 +38,7 @@ def kml_bytes(plan: MissionPlan, name: str) -> bytes:
             *(_stop(plan, order, stop) for order, stop in enumerate(plan.stops, start=1)),
             _placemark("Home", geometry.Point(geometry=_home_point(plan), altitude_mode=_mode(plan))),
             *(_fence(fence) for fence in plan.fences),
+            *(_fence(_ring(circle)) for circle in plan.circles),
         ],
     )
     text = fastkml.KML(features=[document]).to_string(prettyprint=True, precision=DECIMALS)
@@ -82,6 +86,14 @@ def _fence(fence: Fence) -> fastkml.Placemark:
     ring = pygeoif.Polygon([*corners, corners[0]])
     polygon = geometry.Polygon(geometry=ring, altitude_mode=AltitudeMode.clamp_to_ground, tessellate=True)
     return _placemark("Fence" if fence.inclusion else "Keep out", polygon, style="fence")
+
+
+def _ring(circle: Circle) -> Fence:
+    """Return a circle as a polygon around it: KML has none."""
+    angle = np.radians(np.arange(0, 360, 10))
+    plane, radius_m = LocalPlane(circle.lon_deg, circle.lat_deg), circle.radius_m / np.cos(np.radians(5))
+    lon, lat = plane.degrees(np.column_stack([np.cos(angle), np.sin(angle)]) * radius_m).T
+    return Fence(tuple(lon.tolist()), tuple(lat.tolist()), circle.inclusion)
 
 
 def _placemark(

@@ -76,7 +76,7 @@ class Fence:
 
 @dataclass(frozen=True)
 class Circle:
-    """A circular fence, as QGroundControl draws them; we read them and write none ourselves."""
+    """A circular fence, as QGroundControl draws them; ours are keep-outs."""
 
     lon_deg: float
     lat_deg: float
@@ -137,6 +137,9 @@ class MissionPlan:
         What a ground station expects of a plane and of a multirotor, for its own estimates.
     complex_items : tuple of ComplexItem
         Patterns found in a plan that was read.
+    passing : tuple of int
+        Indices of the waypoints that only lead past a keep-out and are no stops, as far as that is known; no part of
+        equality, a .plan does not say.
     warnings : tuple of str
         Sentences about this plan, from making or from reading it; no part of equality.
     """
@@ -151,6 +154,7 @@ class MissionPlan:
     hover_m_s: float
     circles: tuple[Circle, ...] = ()
     complex_items: tuple[ComplexItem, ...] = ()
+    passing: tuple[int, ...] = field(default=(), compare=False)
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     @property
@@ -176,7 +180,21 @@ class MissionPlan:
             )
             if landed or parked:
                 stops.pop()
-        return tuple(self.items[index] for index in stops)
+        return tuple(self.items[index] for index in stops if index not in self.passing)
+
+
+def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Return the longitudes and latitudes of the ways from home to the first stop and from the last one home.
+
+    By way of the points that lead past keep-outs; without the climb out and the approach of a plane.
+    """
+    home, stops = (plan.home.lon_deg, plan.home.lat_deg), plan.stops
+    first, last = ((stop.lon_deg, stop.lat_deg) for stop in (stops[0], stops[-1]))
+    begin = next(index for index, item in enumerate(plan.items) if item is stops[0])
+    passed = [(index, (plan.items[index].lon_deg, plan.items[index].lat_deg)) for index in plan.passing]
+    out = [place for index, place in passed if index < begin]
+    back = [place for index, place in passed if index > begin]
+    return [home, *out, first], [last, *back, home]
 
 
 def _check_point(what: str, lon_deg: float, lat_deg: float) -> None:

@@ -54,6 +54,8 @@ class Sidecar:
         Plan file name to the SHA-256 of what was written, so that later edits are seen.
     sensor : SensorProfile or None
         What will measure, when that was said.
+    passing : tuple of (longitude, latitude)
+        Waypoints that only lead past a keep-out and are no stops.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Sidecar:
     expected: Mapping[str, float]
     plans: Mapping[str, str]
     sensor: SensorProfile | None = None
+    passing: tuple[tuple[float, float], ...] = ()
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -87,6 +90,8 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
         "expected": dict(sidecar.expected),
         "plans": dict(sidecar.plans),
     }
+    if sidecar.passing:
+        about["passing"] = [list(place) for place in sidecar.passing]
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
@@ -154,4 +159,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         expected={str(key): float(value) for key, value in about["expected"].items()},
         plans={str(key): str(value) for key, value in about["plans"].items()},
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
+        passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
     )

@@ -170,6 +170,9 @@ class FlightSection(_Section):
     home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
     wind: tuple[FiniteFloat, FiniteFloat] | None = None
+    sorties: bool = False
+    keep_out: tuple[Path, ...] = ()
+    keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
 
     @field_validator("wind")
     @classmethod
@@ -219,7 +222,7 @@ class MissionSpecification(_Section):
         """The files that this mission is made from."""
         sensor = None if self.sensor is None else self.sensor.profile
         profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
-        paths = (self.area.file, self.prior.field, self.prior.model, *profiles)
+        paths = (self.area.file, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
         return tuple(path for path in paths if path is not None)
 
     @field_validator("name")
@@ -343,6 +346,7 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     flight = spec.flight
     if flight.vehicle.endswith(".toml"):
         flight = flight.model_copy(update={"vehicle": change(Path(flight.vehicle)).as_posix()})
+    flight = flight.model_copy(update={"keep_out": tuple(change(path) for path in flight.keep_out)})
     sensor = spec.sensor
     if sensor is not None and sensor.profile is not None and sensor.profile.endswith(".toml"):
         sensor = sensor.model_copy(update={"profile": change(Path(sensor.profile)).as_posix()})

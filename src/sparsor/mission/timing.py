@@ -143,7 +143,8 @@ class _Watch:
         return circles * 2.0 * math.pi * radius_m / self._speed_m_s
 
     def _place(self, item: MissionItem) -> tuple[float, float]:
-        here = not item.has_position or item.params[4:6] == (0.0, 0.0)
+        # A place at 0/0 is read as "here", where it is not home's own.
+        here = not item.has_position or (item.params[4:6] == (0.0, 0.0) and self._home != (0.0, 0.0))
         return self._at if here else (item.lon_deg, item.lat_deg)
 
     def _height(self, item: MissionItem) -> float:

@@ -35,7 +35,9 @@ def arming_fault(flight: FlightState) -> str | None:
         return "PreArm: Need Position Estimate" if flight.has_fix else "PreArm: GPS 1: Bad fix"
     if flight.parameters["ARMING_CHECK"] and outside:
         return "PreArm: vehicle outside fence"
-    in_auto = flight.mode is Mode.MISSION and int(flight.parameters["AUTO_OPTIONS"]) & 1
+    # A copter only when told to; planes and rovers always (Mode::allows_arming of each).
+    allowed = flight.vehicle.kind != "quad" or int(flight.parameters["AUTO_OPTIONS"]) & 1
+    in_auto = flight.mode is Mode.MISSION and allowed
     if flight.mode not in PILOTED and not in_auto:
         return f"Arm: {flight.flavour.mode_title(flight.mode)} mode not armable"
     return None

@@ -1,0 +1,129 @@
+"""A route beyond one battery, as several flights from home and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SCALE = 10  # PyVRP counts whole numbers: tenths of a second
+ITERATIONS = 2000
+SPARE_SORTIES = 1
+
+
+@dataclass(frozen=True)
+class SortieCosts:
+    """What flights over some of a route's stops use, in seconds of the vehicle's endurance.
+
+    Parameters
+    ----------
+    leg_s : array of float64 (n, n)
+        Between stops, in the direction flown; infinite for legs that may not be flown.
+    out_s, back_s : array of float64 (n,)
+        From home to each stop, and from each stop home.
+    stop_s : array of float64 (n,)
+        At each stop.
+    fixed_s : float
+        Of each flight: take-off, landing, and what else does not depend on the stops.
+    limit_s : float
+        Of each flight: endurance less reserve.
+    """
+
+    leg_s: NDArray[np.float64]
+    out_s: NDArray[np.float64]
+    back_s: NDArray[np.float64]
+    stop_s: NDArray[np.float64]
+    fixed_s: float
+    limit_s: float
+
+    def used_s(self, stops: list[int]) -> float:
+        """Return what one flight uses."""
+        legs = float(self.leg_s[stops[:-1], stops[1:]].sum())
+        ways = self.out_s[stops[0]] + self.back_s[stops[-1]]
+        return float(self.fixed_s + ways + legs + self.stop_s[stops].sum())
+
+    def total_s(self, sorties: list[list[int]]) -> float:
+        """Return what all flights use together."""
+        return sum(self.used_s(stops) for stops in sorties)
+
+    @property
+    def beyond_reach(self) -> NDArray[np.int64]:
+        """The stops that no flight reaches and comes home from."""
+        alone = self.fixed_s + self.out_s + self.back_s + self.stop_s
+        return np.flatnonzero(alone > self.limit_s)
+
+
+def best_sorties(costs: SortieCosts, *, seed: int = 0, iterations: int = ITERATIONS) -> list[list[int]]:
+    """Return the stops of each flight, in order: the route cut best, or PyVRP's, whichever uses less.
+
+    Parameters
+    ----------
+    costs : SortieCosts
+        With every stop within reach; stops numbered in the order of the route.
+    seed, iterations : int
+        Of PyVRP, which ends by a count.
+    """
+    cut = cut_route(costs)
+    other = routed(costs, seed=seed, iterations=iterations, sorties=len(cut) + SPARE_SORTIES)
+    return cut if other is None or costs.total_s(cut) <= costs.total_s(other) else other
+
+
+def cut_route(costs: SortieCosts) -> list[list[int]]:
+    """Return the route in parts that each fit, together using least of all ways to cut it (dynamic programming)."""
+    count = len(costs.out_s)
+    best = np.full(count + 1, np.inf)
+    best[0], begins = 0.0, np.zeros(count + 1, dtype=np.int64)
+    for begin in range(count):
+        used_s = costs.fixed_s + costs.out_s[begin]
+        for end in range(begin, count):
+            if end > begin:
+                used_s += costs.leg_s[end - 1, end]
+            used_s += costs.stop_s[end]
+            if used_s > costs.limit_s:
+                break
+            whole_s = used_s + costs.back_s[end]
+            if whole_s <= costs.limit_s and best[begin] + whole_s < best[end + 1]:
+                best[end + 1], begins[end + 1] = best[begin] + whole_s, begin
+    parts, end = [], count
+    while end > 0:
+        parts.append(list(range(int(begins[end]), end)))
+        end = int(begins[end])
+    return parts[::-1]
+
+
+def routed(costs: SortieCosts, *, seed: int, iterations: int, sorties: int) -> list[list[int]] | None:
+    """Return PyVRP's flights over the same stops, None where it finds none that fit."""
+    from pyvrp import Model
+    from pyvrp.stop import MaxIterations
+
+    count = len(costs.out_s)
+    model = Model()
+    home = model.add_location(0, 0)
+    places = [model.add_location(0, 0) for _ in range(count)]
+    model.add_depot(home)
+    for place in places:
+        model.add_client(place)
+    fixed = _up(costs.fixed_s)
+    room = int(np.floor(costs.limit_s * SCALE)) - fixed
+    model.add_vehicle_type(min(sorties, count), max_distance=room, fixed_cost=fixed)
+    for one in range(count):
+        model.add_edge(home, places[one], distance=_up(costs.out_s[one] + costs.stop_s[one]))
+        model.add_edge(places[one], home, distance=_up(costs.back_s[one]))
+        for other in range(count):
+            if other != one and np.isfinite(costs.leg_s[one, other]):
+                model.add_edge(places[one], places[other], distance=_up(costs.leg_s[one, other] + costs.stop_s[other]))
+    found = model.solve(MaxIterations(iterations), seed=seed, display=False)
+    if not found.is_feasible():
+        return None
+    flights = [[int(visit.idx) for visit in route if visit.is_client()] for route in found.best.routes()]
+    fits = all(costs.used_s(flight) <= costs.limit_s for flight in flights)
+    # By their first stop on the route, so that the same flights come in the same order.
+    return sorted(flights, key=min) if fits else None
+
+
+def _up(seconds: float) -> int:
+    return int(np.ceil(seconds * SCALE))

@@ -1,0 +1,80 @@
+"""Every stop is in exactly one sortie, none is beyond its limit, and no better cut of the route exists."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sparsor.mission.sorties import SortieCosts, best_sorties, cut_route, routed
+
+
+@st.composite
+def costs(draw: st.DrawFn, most: int = 12) -> SortieCosts:
+    """Stops in a square, a home somewhere, a wind that makes one direction longer, a limit within reach."""
+    count = draw(st.integers(1, most))
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    places = rng.uniform(0, 1000, (count, 2))
+    home = rng.uniform(-500, 1500, 2)
+    wind = rng.uniform(-0.3, 0.3, 2)
+
+    def seconds(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        way = end - start
+        return np.hypot(*np.moveaxis(way, -1, 0)) + way @ wind
+
+    out, back = seconds(home, places), seconds(places, home)
+    stop = rng.uniform(0, 60, count)
+    fixed = draw(st.floats(0, 100))
+    alone = fixed + out + back + stop
+    return SortieCosts(
+        seconds(places[:, None], places), out, back, stop, fixed, float(alone.max()) * draw(st.floats(1.001, 3))
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(costs())
+def test_every_stop_is_flown_once_within_the_limit(given_costs: SortieCosts) -> None:
+    count = len(given_costs.out_s)
+    assert not given_costs.beyond_reach.size
+    found = best_sorties(given_costs, iterations=60)
+    assert sorted(itertools.chain(*found)) == list(range(count))
+    assert all(given_costs.used_s(flight) <= given_costs.limit_s for flight in found)
+    cut = cut_route(given_costs)
+    assert given_costs.total_s(found) <= given_costs.total_s(cut)
+    other = routed(given_costs, seed=0, iterations=60, sorties=len(cut) + 1)
+    if other is not None:
+        assert given_costs.total_s(found) <= given_costs.total_s(other)
+    assert found == best_sorties(given_costs, iterations=60)
+
+
+@settings(max_examples=60, deadline=None)
+@given(costs(most=8))
+def test_no_cut_of_the_route_uses_less(given_costs: SortieCosts) -> None:
+    count = len(given_costs.out_s)
+    best = min(
+        given_costs.total_s(parts)
+        for cuts in itertools.product([False, True], repeat=count - 1)
+        for parts in [_parts(count, cuts)]
+        if all(given_costs.used_s(part) <= given_costs.limit_s for part in parts)
+    )
+    assert np.isclose(given_costs.total_s(cut_route(given_costs)), best)
+
+
+def _parts(count: int, cuts: tuple[bool, ...]) -> list[list[int]]:
+    edges = [0, *(place + 1 for place, cut in enumerate(cuts) if cut), count]
+    return [list(range(*pair)) for pair in itertools.pairwise(edges)]
+
+
+def test_a_leg_that_may_not_be_flown_is_not() -> None:
+    leg = np.ones((3, 3))
+    leg[0, 2] = leg[2, 0] = np.inf
+    ways = np.full(3, 10.0)
+    found = best_sorties(SortieCosts(leg, ways, ways, np.zeros(3), 0.0, 100.0), iterations=50)
+    assert all({first, second} != {0, 2} for flight in found for first, second in itertools.pairwise(flight))
+
+
+def test_what_is_too_far_is_named() -> None:
+    ways = np.array([10.0, 60.0])
+    assert SortieCosts(np.ones((2, 2)), ways, ways, np.zeros(2), 5.0, 100.0).beyond_reach.tolist() == [1]
