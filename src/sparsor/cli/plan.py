@@ -209,7 +209,8 @@ def plan(
         float | None,
         _option(
             FLIGHT,
-            "Dwell time at each stop, s (default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
+            "Dwell time at each stop of Algorithm 1, or one dwell, of which the refined search places as many as pay, s "
+            "(default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
             "--hold",
             metavar="S",
         ),
@@ -251,14 +252,15 @@ def plan(
         str | None,
         _option(
             SENSOR,
-            "no2, or a profile of your own (.toml): told to reconstruct-map.",
+            "no2, or a profile of your own (.toml): planned for, and told to reconstruct-map (default: no2, but none with "
+            "Algorithm 1).",
             "--sensor-profile",
             metavar="NAME|FILE.toml",
         ),
     ] = None,
     t90: Annotated[
         float | None,
-        _option(SENSOR, "Instead: the packaged sensor with this time to 90 % of a step, s.", "--t90", metavar="S"),
+        _option(SENSOR, "Instead: no2 with this time to 90 % of a step, s; 0 answers at once.", "--t90", metavar="S"),
     ] = None,
     as_json: Json = False,
     quiet: Annotated[bool, quiet_option("Print only the plan's path, and what speaks against flying it.")] = False,
