@@ -209,7 +209,7 @@ def plan(
         float | None,
         _option(
             FLIGHT,
-            "Dwell time at each stop of Algorithm 1, or one dwell, of which the refined search places as many as pay, s "
+            "Dwell time at each stop of Algorithm 1; one dwell of the refined search, which places as many as pay, s "
             "(default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
             "--hold",
             metavar="S",
@@ -252,7 +252,7 @@ def plan(
         str | None,
         _option(
             SENSOR,
-            "no2, or a profile of your own (.toml): planned for, and told to reconstruct-map (default: no2, but none with "
+            "no2, or a profile of your own (.toml): planned for, and told to reconstruct-map (default: no2, none with "
             "Algorithm 1).",
             "--sensor-profile",
             metavar="NAME|FILE.toml",
