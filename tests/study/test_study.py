@@ -41,8 +41,6 @@ TINY = StudySettings(
     trials=(0, 1),
     draws=2,
     sweep_draws=5,
-    paper_draws=2,
-    paper_sweep_draws=3,
     weights=(0.0, 1.0, 100.0),
 )
 

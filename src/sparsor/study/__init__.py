@@ -1,4 +1,4 @@
-"""How good it is: the protocol, and later baselines and figures."""
+"""How good it is: the protocol, baselines, the scoreboard, the paper's figures and claims."""
 
 from sparsor.study.protocol import Split, SplitMaps, blocked_split, random_split, scaled, study_maps
 

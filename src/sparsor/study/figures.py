@@ -89,14 +89,6 @@ class _Run:
         self.variant = Variant(paper)
         self.suffix = "-paper" if paper else ""
 
-    @property
-    def sweep_draws(self) -> int:
-        return self.settings.paper_sweep_draws if self.paper else self.settings.sweep_draws
-
-    @property
-    def draws(self) -> int:
-        return self.settings.paper_draws if self.paper else self.settings.draws
-
     def trials(self, asked: Sequence[Draws], variant: Variant | None = None) -> list[list[list[dict[str, Any]]]]:
         """Return the samples by trial, and by what was asked for."""
         given = (self.settings, self.store, self.hands)
@@ -113,7 +105,7 @@ class _Run:
 
 def against_length(run: _Run) -> Figure:
     """Return error against path length, with and without Enhanced Sparsification (the paper's `res11`)."""
-    asked = [Draws(p, theta, run.draws) for theta in (THETA, 0) for p in run.settings.probabilities]
+    asked = [Draws(p, theta, run.settings.draws) for theta in (THETA, 0) for p in run.settings.probabilities]
     rows = _over_trials(run.trials(asked), asked)
     with_es, without = ([row for row in rows if row[1] == theta] for theta in (THETA, 0))
     series = (_line("with Enhanced Sparsification", with_es), _line("without", without))
@@ -123,7 +115,7 @@ def against_length(run: _Run) -> Figure:
     return Figure(
         f"error-against-length{run.suffix}",
         f"Error against path length, {run.variant.name}",
-        Table("Error against path length", _COLUMNS, tuple(rows), run.says(run.draws)),
+        Table("Error against path length", _COLUMNS, tuple(rows), run.says(run.settings.draws)),
         (Panel("p = 0.03 ... 0.12", LENGTH, ERROR, series),),
         "Enhanced Sparsification: about 60 % lower error at a path length, and paths down to 200; 0.14 beyond 600",
         f"with Enhanced Sparsification {common}; shortest path {shortest[0]:.0f} with, {shortest[1]:.0f} without; "
@@ -134,7 +126,7 @@ def against_length(run: _Run) -> Figure:
 
 def against_lambda(run: _Run, term: str) -> Figure:
     """Return what a weight of the cost does to its term and to the error (the paper's `path1`, `err12`, `incoh3`)."""
-    count = run.sweep_draws
+    count = run.settings.sweep_draws
     all_samples = [one[0] for one in run.trials([Draws(SWEEP_PROBABILITY, THETA, count)])]
     name = "length" if term == "path" else "incoherence"
     rows = []
@@ -177,7 +169,7 @@ def against_lambda(run: _Run, term: str) -> Figure:
 
 def dictionaries(run: _Run) -> Figure:
     """Return error against path length by dictionary (the paper's `vsdct`)."""
-    asked = [Draws(p, THETA, run.draws) for p in run.settings.probabilities]
+    asked = [Draws(p, THETA, run.settings.draws) for p in run.settings.probabilities]
     table, series, errors = [], [], {}
     for name, label in (("learned", "learned"), ("dct", "DCT-II"), ("polynomial", "polynomial (Legendre)")):
         variant = Variant(run.paper, name)  # type: ignore[arg-type]
@@ -193,7 +185,7 @@ def dictionaries(run: _Run) -> Figure:
     return Figure(
         f"dictionaries{run.suffix}",
         f"Dictionaries, {run.variant.name}",
-        Table("Dictionaries", ("dictionary", *_COLUMNS), tuple(table), run.says(run.draws, "each dictionary")),
+        Table("Dictionaries", ("dictionary", *_COLUMNS), tuple(table), run.says(run.settings.draws, "each dictionary")),
         (Panel("p = 0.03 ... 0.12, theta = 3", LENGTH, ERROR, tuple(series), logarithmic=True),),
         "more than five times lower error with the learned dictionary than with DCT and polynomials",
         f"error of DCT {numbers['dct_relative']:.2f} times, of polynomials {numbers['polynomial_relative']:.2f} times "

@@ -36,8 +36,6 @@ class StudySettings:
         Its seeds.
     draws, sweep_draws : int
         n_iter of the paper's figures, each trial: against path length, and of the lambdas.
-    paper_draws, paper_sweep_draws : int
-        The same with K = 1024, where a sample takes 50 times as long.
     weights : tuple of float
         Values of lambda_path and lambda_incoh, in units that make their terms as large as the error's at the typical
         sample.
@@ -59,8 +57,6 @@ class StudySettings:
     trials: tuple[int, ...] = (0, 1, 2)
     draws: int = 20
     sweep_draws: int = 200
-    paper_draws: int = 3
-    paper_sweep_draws: int = 16
     weights: tuple[float, ...] = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
     def of(self, *names: str) -> dict[str, object]:
@@ -85,7 +81,5 @@ QUICK = StudySettings(
     trials=(0, 1, 2),
     draws=4,
     sweep_draws=24,
-    paper_draws=2,
-    paper_sweep_draws=6,
     weights=(0.0, 0.3, 1.0, 3.0, 30.0),
 )

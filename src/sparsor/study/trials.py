@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 SHAPE = (32, 32)
 Dictionary = Literal["learned", "dct", "polynomial"]
 _DECIDING = ("seed", "rows", "lasso_maps")
-_PAPER_MAPS = 12  # that choose lambda, and half of the test maps: with K = 1024 a LASSO takes 50 times as long
 
 
 class Variant(NamedTuple):
@@ -132,10 +131,9 @@ def trial_given(source: Source, variant: Variant, number: int, settings: StudySe
         else:
             psi = (dct_dictionary if variant.dictionary == "dct" else polynomial_dictionary)(SHAPE, atoms)
         maps = sets.validation - mean
-        judges = _evenly(maps, _PAPER_MAPS) if variant.paper else maps
-        weight = choose_lasso_weight(psi, judges, legs, rows=settings.rows, seed=settings.seed)
+        weight = choose_lasso_weight(psi, maps, legs, rows=settings.rows, seed=settings.seed)
     problem = Problem(psi, maps, weight, legs, settings.rows, unit_rows=not variant.paper, improve=not variant.paper)
-    return TrialGiven(problem, sets, mean, settings.seed, settings.lasso_maps // (2 if variant.paper else 1))
+    return TrialGiven(problem, sets, mean, settings.seed, settings.lasso_maps)
 
 
 def _evaluated(given: TrialGiven, asked: Draws) -> list[dict[str, object]]:
