@@ -16,6 +16,7 @@ from sparsor.mission.items import (
     NAV_LOITER_TO_ALT,
     NAV_LOITER_TURNS,
     NAV_RETURN_TO_LAUNCH,
+    POSITION_OPTIONAL,
     TAKE_OFFS,
 )
 from sparsor.vehicle import CALM, SteadyWind, Vehicle, ground_speed_m_s, landing_seconds, stop_seconds, turn_seconds
@@ -144,7 +145,8 @@ class _Watch:
 
     def _place(self, item: MissionItem) -> tuple[float, float]:
         # A place at 0/0 is read as "here", where it is not home's own.
-        here = not item.has_position or (item.params[4:6] == (0.0, 0.0) and self._home != (0.0, 0.0))
+        nowhere = item.command in POSITION_OPTIONAL and item.params[4:6] == (0.0, 0.0) != self._home
+        here = not item.has_position or nowhere
         return self._at if here else (item.lon_deg, item.lat_deg)
 
     def _height(self, item: MissionItem) -> float:

@@ -130,3 +130,22 @@ def test_a_vehicle_without_a_fix_cannot_be_told_to_be_near(plan_file):
     with practice(speedup=1, ready_s=3000) as server:
         report = upload_mission(plan_file, url_of(server), dry_run=True)
     assert any("does not say where it is" in warning for warning in report.warnings)
+
+
+@pytest.mark.parametrize("kind", ["vtol", "plane", "rover", "boat"])
+def test_modes_are_known_of_every_kind_that_we_plan_for(kind):
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    from sparsor.link.flights.modes import flight_modes, mode_title
+    from sparsor.link.practice.flavour import ARDUPILOT, Mode
+    from sparsor.link.vehicles import FoundVehicle
+    from sparsor.vehicle import load_vehicle
+
+    flavour, mav_type = ARDUPILOT.on(kind), load_vehicle(kind).mav_type
+    for mode in (Mode.MISSION, Mode.GUIDED, Mode.RETURN):
+        beat = mavlink.MAVLink_heartbeat_message(mav_type, 3, 1, flavour.custom_mode(mode), 4, 3)
+        assert mode_title(beat) == flavour.mode_title(mode)
+    found = FoundVehicle(1, 1, 3, mav_type, armed=False)
+    modes = flight_modes(found)
+    assert modes.mission == "AUTO"
+    assert flavour.mode_of(modes.arming) in (Mode.MISSION, Mode.HOLD)

@@ -52,3 +52,18 @@ def test_ardupilots_modes_are_those_of_the_kind(kind: str, mission: int, word: s
     assert {beat.type for beat in beats} == {load_vehicle(kind).mav_type}
     names = mavlink.enums["MAV_TYPE"]
     assert names[load_vehicle(kind).mav_type].name.startswith("MAV_TYPE_")
+
+
+def test_px4_takes_a_rover_that_is_armed_to_be_under_way() -> None:
+    vehicle = load_vehicle("rover")
+    plan = example_plan("px4", stops=2, home=HOME, vehicle=vehicle, span_deg=0.001)
+    rig = Rig.of("px4", plan=plan, vehicle=vehicle)
+    assert rig.upload(mission_messages(plan, "px4")) == 0
+    rig.run(10)
+    before = len(rig.heard)
+    rig.take_off()
+    rig.run(20)
+    states = {one.landed_state for one in rig.heard[before:] if one.get_type() == "EXTENDED_SYS_STATE"}
+    assert mavlink.MAV_LANDED_STATE_IN_AIR in states
+    assert states <= {mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_ON_GROUND}
+    assert not rig.flight.under_way or rig.flight.armed

@@ -11,6 +11,7 @@ from sparsor.geodesy.lengths import distance_m
 from sparsor.link.flights.orders import command_long
 from sparsor.link.flights.route import Route
 from sparsor.link.missions.checks import position_of
+from sparsor.mission import time_plan
 from sparsor.mission.items import WAYPOINTS
 from sparsor.vehicle import load_vehicle
 
@@ -135,7 +136,7 @@ def _flight(plan: MissionPlan, profile: Vehicle) -> tuple[float, float, float]:
     heights = [item.altitude_m for item in plan.items if item.command in WAYPOINTS]
     height_m = max(heights, default=0.0)
     length_m = route.left_m(0, plan.home.lon_deg, plan.home.lat_deg)
-    return length_m, max(height_m, 0.0) / profile.climb_m_s + route.left_s(0, length_m, height_m), height_m
+    return length_m, time_plan(plan, profile).seconds, height_m
 
 
 def _battery(vehicle: FoundVehicle, connection: Connection) -> int | None:

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from sparsor.link.inbox import Message
     from sparsor.link.vehicles import FoundVehicle
 
+ARDUPILOT: Final = 3  # MAV_AUTOPILOT
+FIXED_WING: Final = 1  # MAV_TYPE
 # ArduPilot's mode to arm in. A copter in AUTO is "not armable" (ModeAuto::allows_arming, AUTO_OPTIONS aside), in GUIDED
 # a ground station may arm it (ModeGuided::allows_arming). Planes and rovers arm in any of these (Mode::allows_arming);
 # a plane takes off as soon as it is armed in AUTO, a rover that is armed in HOLD stands still.
@@ -46,7 +48,8 @@ def flight_modes(vehicle: FoundVehicle) -> FlightModes:
 
     if vehicle.autopilot is not None and vehicle.autopilot.name == "px4":
         return FlightModes("MISSION", None)
-    numbers = mavutil.mode_mapping_byname(vehicle.vehicle_type)
+    kind = FIXED_WING if vehicle.vehicle_type in VTOLS else vehicle.vehicle_type
+    numbers = mavutil.mode_mapping_byname(kind)
     arming = next((mode for kinds, mode in ARMING.items() if vehicle.vehicle_type in kinds), None)
     if vehicle.autopilot is None or numbers is None or arming not in numbers:
         raise LinkError(
@@ -60,4 +63,8 @@ def mode_title(heartbeat: Message) -> str:
     """Return what the autopilot calls the mode of a HEARTBEAT."""
     from pymavlink import mavutil
 
+    if heartbeat.type in VTOLS and heartbeat.autopilot == ARDUPILOT:
+        # A VTOL has ArduPlane's modes; pymavlink knows that of some of their MAV_TYPEs only.
+        names = mavutil.mode_mapping_bynumber(FIXED_WING)
+        return str(names.get(heartbeat.custom_mode, f"Mode({heartbeat.custom_mode})"))
     return str(mavutil.mode_string_v10(heartbeat))

@@ -131,8 +131,12 @@ def _system_time(flight: Flight, boot_unix_s: float) -> Message:
 
 def _extended_state(flight: Flight, _: float) -> Message:
     motion, landed = flight.motion, mavlink.MAV_LANDED_STATE_IN_AIR
-    if not flight.vehicle.flies and not flight.flavour.is_px4:
-        landed = mavlink.MAV_LANDED_STATE_UNDEFINED  # ArduRover does not say
+    if not flight.vehicle.flies:
+        # ArduRover does not say; PX4's RoverLandDetector takes what is armed to be under way.
+        if not flight.flavour.is_px4:
+            landed = mavlink.MAV_LANDED_STATE_UNDEFINED
+        elif not flight.armed:
+            landed = mavlink.MAV_LANDED_STATE_ON_GROUND
     elif flight.landed:
         landed = mavlink.MAV_LANDED_STATE_ON_GROUND
     elif motion.up_m < 1.0 and motion.up_m_s > 0:
