@@ -16,6 +16,8 @@ HEAVY = ("mavsdk", "rasterio", "matplotlib", "numba", "sklearn", "scipy", "pypro
 
 
 def start(*words, **options):
+    if sys.platform != "win32":  # a shell's background job, as these tests may be, leaves Ctrl-C ignored
+        options["preexec_fn"] = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
     command = [sys.executable, "-c", "from sparsor.cli.main import generate_mission as run; run()", *words]
     return subprocess.Popen(command, stdout=subprocess.PIPE, **options)
 
