@@ -29,7 +29,7 @@ _PATIENCE_S = 60  # with a scheduler whose workers all died
 _AHEAD = 2  # parts handed out for each worker, so that none waits for the next
 _KEPT = 8  # shared values that a worker process keeps unpacked
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-_GRAIN = 8  # a part and its result take some milliseconds to a worker and back
+_GRAIN = 32  # a part and its result take some milliseconds to a worker and back
 
 
 class Cluster:
