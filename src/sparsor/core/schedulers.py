@@ -6,6 +6,7 @@ import logging
 import os
 import warnings
 from contextlib import contextmanager
+from functools import partial
 from importlib import metadata
 from platform import python_version
 from typing import TYPE_CHECKING
@@ -105,8 +106,12 @@ def _client(address: str) -> Iterator[Client]:
     """Yield the client of a scheduler whose workers run what is run here."""
     from distributed import Client
 
+    connect = partial(Client, address, timeout=_ANSWER_S, set_as_default=False)
     try:
-        client = Client(address, timeout=_ANSWER_S, set_as_default=False)
+        try:
+            client = connect()
+        except AssertionError:  # dask's own thread did not start within its ten seconds: a machine that stood still
+            client = connect()
     except (OSError, ValueError, ImportError, TypeError) as error:
         raise SchedulerError(
             f"no dask scheduler answers at '{address}' ({error}): is it started ('dask scheduler'), and is the "
