@@ -14,7 +14,7 @@ from sparsor.design.decoders import Measurements
 from sparsor.design.decoders.covariance import training_covariance
 from sparsor.design.decoders.decode import DecoderName, candidates
 from sparsor.design.decoders.setting import Setting
-from sparsor.design.refined import Sensor, Task, refine
+from sparsor.design.refined import T90_OVER_TAU, Sensor, Task, refine
 from sparsor.errors import BudgetError, DesignError
 from sparsor.journeys.algorithm1 import drawn_within
 from sparsor.prior.statistics import unit_shapes
@@ -37,7 +37,6 @@ READING_NOISE = 0.05**2
 # the air on the day nobody knows before the flight; a prior from column densities says nothing of it.
 SPREAD_OVER_NOISE: Final = 13.0 / 5.0
 _SAMPLES = 64  # of Algorithm 1: one start among many
-_T90_OVER_TAU = float(np.log(10.0))
 LINEAR: Final[tuple[DecoderName, ...]] = ("kriging", "mmse", "blend")
 
 
@@ -78,7 +77,7 @@ def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_
         covariance = training_covariance(model, problem.legs.allowed)
     # The profile's own noise cancels: the maps are as much larger as the sensor is fit to tell.
     noise_s = sensor.interval_s / SPREAD_OVER_NOISE**2 if sensor.noise_sd > 0 else 0.0
-    answer = Sensor(READING_NOISE, noise_s, sensor.t90_s / _T90_OVER_TAU)
+    answer = Sensor(READING_NOISE, noise_s, sensor.t90_s / T90_OVER_TAU)
     # A dwell of a budget of time is told apart from a stop that is flown through.
     budget = replace(problem.budget, per_stop=0.0)
     return Task(covariance, problem.legs, budget, answer, hold_s, braking_s)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from sparsor.core.streams import stream
 from sparsor.design import Budget
-from sparsor.design.refined import Sensor, Task
+from sparsor.design.refined import T90_OVER_TAU, Sensor, Task
 from sparsor.design.refined.flyover import flyover, passes
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from sparsor.study.cases import Case
 
 Measured = Literal["legs", "stops"]
-T90_OVER_TAU = float(np.log(10.0))
 # Streams of the noise on validation and on test maps.
 _NOISE = {"validation": 8, "test": 9}
 # Of the maps' variance: what keeps a search without noise from trusting details of the covariance.

@@ -8,7 +8,7 @@ same recurrence.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,6 +16,8 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.design.refined.posterior import Belief
 
+T90_OVER_TAU: Final = float(np.log(10.0))
+"""Time to 90 % of a step over the time constant, of a first-order response."""
 _NEGLIGIBLE = 0.01  # of a difference in what the sensor holds: some readings later nobody can tell
 _LEAST_CHANGE = 1e-9  # of a precision
 _LEAST_NOISE = 1e-12
