@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 from collections import deque
@@ -64,28 +65,35 @@ class MavsdkMissions:
 
     def __init__(self, connection: Connection, vehicle: FoundVehicle, timeout_s: float) -> None:
         from mavsdk import ComponentType, Configuration, Mavsdk
-        from mavsdk.logging import log_subscribe
         from mavsdk.plugins.mission_raw import MissionRaw
 
-        log_subscribe(lambda *_: True)  # it prints on stdout, which carries the command's result
+        _keep_silent()
         self._connection, self._vehicle = connection, vehicle
         self._kind = MISSION
+        self._feeding = threading.Lock()
+        self._closed = False
         self._recent: deque[bytes] = deque(maxlen=RECENT)
         self._outgoing = FrameReader()
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         self._mavsdk.add_any_connection("raw://")
         self._mavsdk.subscribe_raw_bytes_to_be_sent(self._send)
+        self._plugin: Any = None
         self._end = connection.listen(self._feed)
         try:
-            self._plugin: Any = MissionRaw(self._system(timeout_s))
+            self._plugin = MissionRaw(self._system(timeout_s))
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
-        """End mavsdk; nothing is sent after that."""
+        """End mavsdk; nothing is sent after that; can be called twice."""
         self._end()
+        with self._feeding:  # the reading thread may be giving it a frame: not to one that is destroyed
+            self._closed = True
+        # Its threads may call what waits for an abandoned transfer until it is destroyed; it lets go of that before.
+        waiting = list(vars(self._plugin)["_callbacks"]) if self._plugin is not None else []
         self._mavsdk.destroy()
+        waiting.clear()
 
     def upload(self, kind: int, items: Sequence[WireItem], progress: Progress) -> None:
         """Send all items of a MAV_MISSION_TYPE."""
@@ -164,11 +172,12 @@ class MavsdkMissions:
 
     def _feed(self, received: Received) -> None:
         raw = received.frame.raw
-        if received.frame.system_id != self._vehicle.system_id or raw in self._recent:
-            return
-        self._recent.append(raw)
-        if not self._held_back(received):
-            self._mavsdk.pass_received_raw_bytes(raw)
+        with self._feeding:
+            if self._closed or received.frame.system_id != self._vehicle.system_id or raw in self._recent:
+                return
+            self._recent.append(raw)
+            if not self._held_back(received):
+                self._mavsdk.pass_received_raw_bytes(raw)
 
     def _held_back(self, received: Received) -> bool:
         message = received.message
@@ -179,6 +188,14 @@ class MavsdkMissions:
     def _send(self, raw: bytes) -> None:
         with suppress(SparsorError):  # the connection remembers why it failed, and `_wait` asks it
             self._connection.send_frames(raw, self._outgoing.feed(raw))
+
+
+@functools.cache
+def _keep_silent() -> None:
+    """Stop mavsdk's words on stdout, which carries the command's result; once, for it frees the function it had."""
+    from mavsdk.logging import log_subscribe
+
+    log_subscribe(lambda *_: True)
 
 
 def mavsdk_item(number: int, kind: int, item: WireItem) -> Any:  # noqa: ANN401 # mavsdk has no types
