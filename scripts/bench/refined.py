@@ -19,8 +19,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import tempfile
 import time
 from dataclasses import replace
 from functools import cache
@@ -32,17 +30,16 @@ import numpy as np
 from sparsor.core.metrics import relative_error, squared_error
 from sparsor.core.streams import stream
 from sparsor.core.workers import one_blas_thread
-from sparsor.design import Budget, Problem, Weights, fixed_sparsity, search, shortest_path, unit_legs
+from sparsor.design import Budget, Problem, Weights, fixed_sparsity, search, unit_legs
 from sparsor.design.refined import DEFAULT_ITERATIONS, refine
-from sparsor.design.refined.costs import costs
-from sparsor.design.refined.starts import tour_within
 from sparsor.design.tuning import choose_lasso_weight
 from sparsor.prior.reading import read_field
 from sparsor.study import study_maps
 from sparsor.study.baselines import best_within, lawnmower, qr_pivot_tour, random_tour, tuned_ipp
 from sparsor.study.cases import blocked_case
-from sparsor.study.decoding import decode_lasso, decode_linear, validation_error
+from sparsor.study.decoding import decode_lasso, decode_linear
 from sparsor.study.observing import flown_at, of_cells, readings, task_of
+from sparsor.study.peers import best_kind, find_peers, peer_routes
 from sparsor.study.protocol import BLOCKED_FOLDS, PAPER_PIXELS
 
 SHAPE = (32, 32)
@@ -50,7 +47,6 @@ BUDGETS, NOISES = (102, 200, 274), (0.0, 0.01)
 ATOMS, ROWS, PROBABILITY, THETA = 256, 35, 0.03, 3
 # The example of the packaged quadrotor: 3 km box, 10 m/s.
 LEGS = flown_at(unit_legs(SHAPE), 3000.0 / SHAPE[0] / 10.0)
-PEERS = Path(__file__).with_name("peers.py")
 # Of method's measured references, for where SGP-Tools is not installed: Gulf relative, wide squared errors.
 QUOTED = {
     (0.0, False): {102: 0.072, 200: 0.017, 274: 0.008},
@@ -142,7 +138,13 @@ def main() -> None:
     print("| noise | t90, s | budget | route | measured | decoder |", end="")
     print(" | ".join(f" fold {k}" for k in range(len(folds))) + " | mean | length | s |")
     print("|---" * (len(folds) + 9) + "|")
-    peers = [peer_routes(fold, options) for fold in folds] if options.sgptools_python else []
+    peers = []
+    if options.sgptools_python:
+        known, budgets = (
+            find_peers(options.sgptools_python, options.peer_steps),
+            [Budget(one, "distance") for one in BUDGETS],
+        )
+        peers = [peer_routes(known, fold.case.sets.training, LEGS, budgets) for fold in folds]
     for sd in NOISES:
         for t90_s in sorted({0.0, options.t90}):
             for limit in BUDGETS:
@@ -203,31 +205,6 @@ def quoted(limit, sd, squared) -> str:
     return f"| {sd:g} | 0 | {limit} | {name} | legs | blend | {QUOTED[sd, squared][limit]:g} (mean of 3 folds) |"
 
 
-def peer_routes(fold, options):
-    """Return the routes of other planners over a fold: by planner and budget, of all kinds that fit it."""
-    with tempfile.TemporaryDirectory() as folder:
-        given, found = Path(folder) / "given.npz", Path(folder) / "found.npz"
-        maps = fold.case.sets.training
-        np.savez(given, maps=maps, shape=SHAPE, limits=np.array(BUDGETS, float), steps=options.peer_steps)
-        subprocess.run([options.sgptools_python, PEERS, given, found], check=True, stderr=subprocess.DEVNULL)
-        answers = dict(np.load(found))
-    routes = {}
-    for key in (one for one in answers if not one.endswith("|seconds")):
-        name, limit, kind = key.split("|")
-        stops = within(answers[key], kind, Budget(float(limit), "distance"))
-        if stops is not None:
-            routes.setdefault((name, float(limit)), []).append(Planned(stops, float(answers[f"{key}|seconds"])))
-    return routes
-
-
-def within(cells, kind, budget):
-    """Return a peer's cells as a route, or nothing when it is too long: our 2-opt orders them where that is shorter."""
-    if kind.startswith("ranking"):
-        return tour_within(cells, costs(budget, LEGS))
-    tour = min([cells, shortest_path(cells, LEGS.length)], key=LEGS.path_length)
-    return tour if tour.size > 1 and budget.used(tour, LEGS) <= budget.limit else None
-
-
 def report_peer(name, folds, peers, limit, sd, t90_s, metric) -> None:
     """Print the kind, of kernel and number of stops, that the validation maps choose for each fold."""
     if not all((name, limit) in of for of in peers):
@@ -235,21 +212,13 @@ def report_peer(name, folds, peers, limit, sd, t90_s, metric) -> None:
         return
     for measured in ("legs", "stops"):
         routes = [
-            best_kind(fold, of[name, limit], measured, sd, t90_s, metric) for fold, of in zip(folds, peers, strict=True)
+            best_kind(of[name, limit], fold.case, LEGS, measured, sd=sd, t90_s=t90_s, by=metric)
+            for fold, of in zip(folds, peers, strict=True)
         ]
         errors = [
             blend_error(fold, one.stops, measured, sd, t90_s, metric) for fold, one in zip(folds, routes, strict=True)
         ]
         print_row(sd, t90_s, limit, name, measured, "blend", errors, routes)
-
-
-def best_kind(fold, kinds, measured, sd, t90_s, metric):
-    def error(one):
-        with one_blas_thread():
-            made = readings(LEGS, one.stops, measured, sd=sd, t90_s=t90_s)
-            return validation_error(fold.case, made, "blend", metric)
-
-    return min(kinds, key=error)
 
 
 def arguments() -> argparse.Namespace:

@@ -36,6 +36,16 @@ def study(
         typer.Option("--results", metavar="FILE.md", help="The page (default: results.md in DIR).", show_default=False),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A small study, to see that all is there.")] = False,
+    peers_python: Annotated[
+        str | None,
+        typer.Option(
+            "--peers-python",
+            metavar="PATH",
+            help="A Python that has planners by others, sgptools or python-sensors: they run too (default: this one, "
+            "where it has them).",
+            show_default=False,
+        ),
+    ] = None,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="local|ADDRESS", help=SCHEDULER, show_default=False)
     ] = None,
@@ -53,7 +63,8 @@ def study(
     talk = Talk.of(quiet=quiet, verbose=verbose)
     words = ["sparsor", "study", *(word for path in fields or () for word in ("--field", path.name))]
     words += ["-o", str(output), *(("--results", str(results)) if results else ()), *(("--quick",) if quick else ())]
-    request = StudyRequest(tuple(fields or ()), output, results, shlex.join(words), quick)
+    words += ["--peers-python", "PATH"] if peers_python else []
+    request = StudyRequest(tuple(fields or ()), output, results, shlex.join(words), quick, peers_python=peers_python)
     with workers_at(scheduler) as hands, progress_bar(talk) as progress:
         done = study(request, workers=hands, progress=progress)
     if as_json:

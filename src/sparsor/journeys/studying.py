@@ -16,6 +16,7 @@ from sparsor.study.against_ipp import against_ipp, board_panels
 from sparsor.study.claims import claims
 from sparsor.study.example import example
 from sparsor.study.figures import figures
+from sparsor.study.peers import Peers, find_peers, own_python
 from sparsor.study.scoreboard import scoreboard
 from sparsor.study.settings import FULL, QUICK, StudySettings
 from sparsor.study.sources import builtin_field, source_of
@@ -49,6 +50,8 @@ class StudyRequest:
         Folder of the finished pieces; in the cache by default.
     settings : StudySettings, optional
         Instead of those that `quick` names.
+    peers_python : str, optional
+        A Python that has planners by others, SGP-Tools or PySensors; by default this one, where it has them.
     """
 
     fields: tuple[Path, ...]
@@ -58,6 +61,7 @@ class StudyRequest:
     quick: bool = False
     pieces: Path | None = None
     settings: StudySettings | None = None
+    peers_python: str | None = None
 
 
 @dataclass(frozen=True)
@@ -90,22 +94,25 @@ def study(request: StudyRequest, *, workers: Workers | int | None = None, progre
     Raises
     ------
     InputError
-        When a field cannot be read or is too small, or two fields have one name.
+        When a field cannot be read or is too small, two fields have one name, or a Python for others' planners has
+        none.
     OutputError
         When something cannot be written.
     """
     settings = request.settings or (QUICK if request.quick else FULL)
     store = Store(request.pieces or cache_folder() / "study")
     hands = workers_of(workers)
+    python = request.peers_python or own_python()
+    peers = find_peers(python, settings.peer_steps) if python else None
     page = request.results or request.output / "results.md"
     results: list[FieldResults] = []
     contents: dict[str, bytes] = {}
     for name, source in _sources(request.fields).items():
-        one = _studied(name, source, settings, store, hands, progress)
+        one = _studied(name, source, settings, store, peers, hands, progress)
         results.append(one)
         contents |= {f"{name}/{file}": content for file, content in one.files().items()}
     write_files(request.output, contents)
-    text = results_page(results, settings, request.command, request.output, page)
+    text = results_page(results, settings, request.command, request.output, page, peers)
     write_files(page.parent, {page.name: text.encode()})
     return Studied(page, tuple(request.output / name for name in contents), tuple(results))
 
@@ -125,9 +132,15 @@ def _by_name(field: Field, path: Path) -> Field:
 
 
 def _studied(
-    name: str, source: Source, settings: StudySettings, store: Store, hands: Workers, progress: Progress
+    name: str,
+    source: Source,
+    settings: StudySettings,
+    store: Store,
+    peers: Peers | None,
+    hands: Workers,
+    progress: Progress,
 ) -> FieldResults:
-    rows = scoreboard(source, settings, store, workers=hands, progress=progress)
+    rows = scoreboard(source, settings, store, peers=peers, workers=hands, progress=progress)
     made = [
         *figures(source, settings, store, workers=hands, progress=progress),
         against_ipp(rows, source.field.source),

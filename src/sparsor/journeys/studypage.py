@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from sparsor.study.figures import Figure
+    from sparsor.study.peers import Peers
     from sparsor.study.scoreboard import Source
     from sparsor.study.settings import StudySettings
     from sparsor.study.tables import Table
@@ -81,7 +82,12 @@ class FieldResults:
 
 
 def results_page(
-    results: Sequence[FieldResults], settings: StudySettings, command: str, folder: Path, page: Path
+    results: Sequence[FieldResults],
+    settings: StudySettings,
+    command: str,
+    folder: Path,
+    page: Path,
+    peers: Peers | None = None,
 ) -> str:
     """Return the page of results in Markdown.
 
@@ -95,8 +101,11 @@ def results_page(
         Of the files.
     page : Path
         Where it will lie: links are relative to it.
+    peers : Peers, optional
+        Planners by others that ran.
     """
-    known = ", ".join(f"{name} {version}" for name, version in versions().items())
+    used = versions() | (peers.versions if peers else {})
+    known = ", ".join(f"{name} {version}" for name, version in used.items())
     parts = [
         "# Results",
         f"Written by `{command}`; do not edit. The {settings.name} study, seed {settings.seed}; {known}; source "

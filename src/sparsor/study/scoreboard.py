@@ -20,6 +20,7 @@ from sparsor.study.baselines import best_within, lawnmower, qr_pivot_tour, rando
 from sparsor.study.cases import Case, blocked_case, random_case
 from sparsor.study.decoding import LINEAR, decode_lasso, decode_linear
 from sparsor.study.observing import Readings, of_cells, readings, task_of
+from sparsor.study.peers import PeerRoute, Peers, best_kind, peer_routes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from sparsor.study.store import Store
 
 PLANNERS = ("lawnmower", "random cells", "QR pivots", "greedy IPP", "Algorithm 1", "refined")
+_DEAF = frozenset(PLANNERS) - {"refined"}  # to the noise; of others' planners the validation maps choose a kind by it
 _DECIDING = ("noises", "seed", "moves", "samples", "atoms", "rows", "lasso_maps")
 _RANDOM = 11  # the stream of random cells
 
@@ -59,11 +61,16 @@ class Source:
 
 
 class Given(NamedTuple):
-    """What all pieces of one split are given: its case, Algorithm 1's problem without a budget, the settings."""
+    """What all pieces of one split are given.
+
+    Its case, Algorithm 1's problem without a budget, the settings, and the routes of others' planners by planner and
+    share of full coverage.
+    """
 
     case: Case
     problem: Problem
     settings: StudySettings
+    peers: dict[tuple[str, float], list[PeerRoute]] = {}  # noqa: RUF012 # a tuple's default; nobody changes it
 
 
 class _Part(NamedTuple):
@@ -78,7 +85,13 @@ class _Flown(NamedTuple):
 
 
 def scoreboard(
-    source: Source, settings: StudySettings, store: Store, *, workers: Workers | int = 1, progress: Progress = silent
+    source: Source,
+    settings: StudySettings,
+    store: Store,
+    *,
+    peers: Peers | None = None,
+    workers: Workers | int = 1,
+    progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Return the rows of the scoreboard, one a split, planner, length, noise, way of measuring and decoder.
 
@@ -88,6 +101,8 @@ def scoreboard(
     settings : StudySettings
     store : Store
         Pieces that are there are not made again.
+    peers : Peers, optional
+        Planners by others, which run too.
     workers : Workers or int
     progress : Progress
 
@@ -101,14 +116,18 @@ def scoreboard(
     splits = [("blocked", fold) for fold in settings.folds] + [("random", seed) for seed in settings.seeds]
     for done, (protocol, number) in enumerate(splits):
         progress("scoreboard", done, len(splits))
-        parts = [_Part(planner, share) for planner in PLANNERS for share in settings.shares]
-        keys = [_key(source, settings, protocol, number, part) for part in parts]
+        planners = (*PLANNERS, *(peers.planners if peers else ()))
+        parts = [_Part(planner, share) for planner in planners for share in settings.shares]
+        keys = [_key(source, settings, protocol, number, part, peers) for part in parts]
         pieces = [store.get(key) for key in keys]
         missing = [k for k, piece in enumerate(pieces) if piece is None]
         if missing:
             # Around all threads: one that left it alone would give the others back their many threads of BLAS.
             with one_blas_thread():
-                shared = hands.share(split_given(source, protocol, number, settings, store))
+                given = split_given(source, protocol, number, settings, store)
+                if peers and any(parts[k].planner in peers.planners for k in missing):
+                    given = given._replace(peers=_peers(given, peers))
+                shared = hands.share(given)
                 made = hands.map(_piece, shared, [parts[k] for k in missing])
                 for k, piece in zip(missing, made, strict=True):
                     pieces[k] = store.put(keys[k], piece)
@@ -117,9 +136,23 @@ def scoreboard(
     return rows
 
 
-def _key(source: Source, settings: StudySettings, protocol: str, number: int, part: _Part) -> dict[str, object]:
+def _key(
+    source: Source, settings: StudySettings, protocol: str, number: int, part: _Part, peers: Peers | None
+) -> dict[str, object]:
     split = {"field": source.digest, "pixels": source.pixels, "protocol": protocol, "number": number}
-    return {"kind": "scoreboard", **split, **part._asdict(), **settings.of(*_DECIDING)}
+    key = {"kind": "scoreboard", **split, **part._asdict(), **settings.of(*_DECIDING)}
+    if peers and part.planner in peers.planners:
+        key |= {"peers": peers.versions, "steps": peers.steps}
+    return key
+
+
+def _peers(given: Given, peers: Peers) -> dict[tuple[str, float], list[PeerRoute]]:
+    """Return the routes of others' planners, by planner and share of full coverage."""
+    legs = given.problem.legs
+    share_of = {share * (legs.size - 1): share for share in given.settings.shares}
+    budgets = [Budget(limit, "distance") for limit in share_of]
+    found = peer_routes(peers, given.case.sets.training, legs, budgets)
+    return {(planner, share_of[limit]): routes for (planner, limit), routes in found.items()}
 
 
 def _case(source: Source, protocol: str, number: int) -> Case:
@@ -150,9 +183,9 @@ def _piece(given: Given, part: _Part) -> list[dict[str, object]]:
     flown: _Flown | None = None
     with one_blas_thread():
         for sd in given.settings.noises:
-            if flown is None or part.planner == "refined":  # no other looks at the noise
+            if flown is None or part.planner not in _DEAF:
                 try:
-                    flown = _flown(given, part.planner, limit, sd)
+                    flown = _flown(given, part, limit, sd)
                 except BudgetError:
                     return []
             length = given.problem.legs.path_length(flown.stops)
@@ -161,9 +194,14 @@ def _piece(given: Given, part: _Part) -> list[dict[str, object]]:
     return rows
 
 
-def _flown(given: Given, planner: str, limit: float, sd: float) -> _Flown:
-    begun = time.perf_counter()
+def _flown(given: Given, part: _Part, limit: float, sd: float) -> _Flown:
+    begun, planner = time.perf_counter(), part.planner
     case, legs, settings = given.case, given.problem.legs, given.settings
+    if planner not in PLANNERS:
+        routes = given.peers.get((planner, part.share))
+        if not routes:
+            raise BudgetError(f"{planner} has no route of its own within {limit:g} cell units")
+        return _Flown(*best_kind(routes, case, legs, "legs", sd=sd, t90_s=0.0, by=squared_error))
     budget = Budget(limit, "distance")
     if planner == "Algorithm 1":
         problem = replace(given.problem, budget=budget)

@@ -36,6 +36,8 @@ class StudySettings:
         Its seeds.
     draws, sweep_draws : int
         n_iter of the paper's figures, each trial: against path length, and of the lambdas.
+    peer_steps : int
+        Of SGP-Tools' optimiser, where it runs.
     weights : tuple of float
         Values of lambda_path and lambda_incoh, in units that make their terms as large as the error's at the typical
         sample.
@@ -57,6 +59,7 @@ class StudySettings:
     trials: tuple[int, ...] = (0, 1, 2)
     draws: int = 20
     sweep_draws: int = 200
+    peer_steps: int = 100
     weights: tuple[float, ...] = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
     def of(self, *names: str) -> dict[str, object]:
@@ -81,5 +84,6 @@ QUICK = StudySettings(
     trials=(0, 1, 2),
     draws=4,
     sweep_draws=24,
+    peer_steps=10,
     weights=(0.0, 0.3, 1.0, 3.0, 30.0),
 )

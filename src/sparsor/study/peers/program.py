@@ -1,10 +1,9 @@
-#!/usr/bin/env python3
-"""Routes of other people's planners, through their own interfaces: SGP-Tools 2.x and PySensors.
+"""A program of its own: routes by SGP-Tools 2.x and PySensors, through their own interfaces.
 
-It runs in the Python that has them (`scripts/bench/refined.py --sgptools-python` starts it) and knows nothing of
+It runs in the Python that has them (`peer_routes` starts it), which may be another than ours, and knows nothing of
 sparsor: arrays come and go as .npz.
 
-    peers.py GIVEN.npz FOUND.npz
+    program.py GIVEN.npz FOUND.npz
 
 GIVEN holds `maps` (n, N) for training, `shape`, `limits` (budgets, cell units) and `steps` of the optimiser. FOUND
 holds for each answer an array of cells named `PLANNER|LIMIT|KIND`, in the order of its own tour where it makes one,
@@ -16,8 +15,11 @@ from __future__ import annotations
 import sys
 import time
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
+
+Array = Any  # numpy's, of whatever version is there
 
 _TOUR = 0.7124  # a tour of n random points in an area A is about this times sqrt(n A) long
 _SHARES = (0.55, 0.75, 0.95)  # of the points that would fill the budget at random
@@ -27,7 +29,9 @@ _LEAST_NOISE = 1e-4  # GPflow refuses what lies at its bound of 1e-6
 
 
 def main() -> None:
-    given, found = np.load(sys.argv[1]), {}
+    """Read what is asked and write what is found."""
+    given = np.load(sys.argv[1])
+    found: dict[str, Any] = {}
     maps, shape, steps = given["maps"], tuple(given["shape"].tolist()), int(given["steps"])
     places = np.stack(np.divmod(np.arange(maps.shape[1]), shape[1]), axis=1).astype(np.float64)
     kernels = fitted_kernels(maps, places, steps) if find_spec("sgptools") else {}
@@ -36,17 +40,18 @@ def main() -> None:
         if find_spec("pysensors"):
             found |= pysensors(maps, limit, counts)
         for name, kernel in kernels.items():
-            found |= sgptools(name, *kernel, places, shape, limit, counts, steps)
+            found |= sgptools(name, kernel, places, shape, limit, counts, steps)
     np.savez(sys.argv[2], **found)
 
 
-def pysensors(maps, limit, counts):
+def pysensors(maps: Array, limit: float, counts: list[int]) -> dict[str, Any]:
     """Return QR and cost-constrained QR placements: rankings of as many cells as modes."""
     from pysensors import SSPOR
     from pysensors.basis import SVD
     from pysensors.optimizers import CCQR, QR
 
-    found, side = {}, round(maps.shape[1] ** 0.5)
+    found: dict[str, Any] = {}
+    side = round(maps.shape[1] ** 0.5)
     row, column = np.divmod(np.arange(maps.shape[1]), side)
     # Cost of a cell: how far it lies from the centre, on the scale of the basis' rows.
     away = np.hypot(row - (side - 1) / 2, column - (side - 1) / 2) / side
@@ -59,7 +64,7 @@ def pysensors(maps, limit, counts):
     return found
 
 
-def fitted_kernels(maps, places, steps):
+def fitted_kernels(maps: Array, places: Array, steps: int) -> dict[str, Any]:
     """Return kernels and noises as SGP-Tools fits them to training maps."""
     import gpflow
     from sgptools.utils.gpflow import get_model_params
@@ -75,7 +80,15 @@ def fitted_kernels(maps, places, steps):
     return kernels
 
 
-def sgptools(name, kernel, noise, places, shape, limit, counts, steps):
+def sgptools(
+    name: str,
+    fitted: tuple[Any, float],
+    places: Array,
+    shape: tuple[int, int],
+    limit: float,
+    counts: list[int],
+    steps: int,
+) -> dict[str, Any]:
     """Return stops placed as inducing points: alone, and along a path within the budget."""
     import tensorflow as tf
     from sgptools.core.transformations import IPPTransform
@@ -84,7 +97,8 @@ def sgptools(name, kernel, noise, places, shape, limit, counts, steps):
     from sgptools.utils.tsp import run_tsp
 
     tf.random.set_seed(0)
-    found = {}
+    kernel, noise = fitted
+    found: dict[str, Any] = {}
     for count in counts:
         begun = time.perf_counter()
         start = get_inducing_pts(places, count, seed=0)
@@ -102,12 +116,14 @@ def sgptools(name, kernel, noise, places, shape, limit, counts, steps):
     return found
 
 
-def cells_of(places, shape):
+def cells_of(places: Array, shape: tuple[int, int]) -> Array:
+    """Return the cells nearest to places, each once, in their order."""
     cells = np.rint(places).astype(int) @ np.array([shape[1], 1])
     return cells[np.sort(np.unique(cells, return_index=True)[1])]
 
 
-def answer(planner, limit, kind, cells, begun):
+def answer(planner: str, limit: float, kind: str, cells: Array, begun: float) -> dict[str, Any]:
+    """Return one answer and its seconds."""
     name = f"{planner}|{limit:g}|{kind}"
     return {name: np.asarray(cells), f"{name}|seconds": time.perf_counter() - begun}
 
