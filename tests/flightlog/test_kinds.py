@@ -161,6 +161,12 @@ def test_a_missing_value_leaves_out_only_itself():
     assert recording.damage.places == 1
 
 
+@pytest.mark.parametrize("cell", ["1\x1f", "1_0", "\u0661", "0x10", "1e", "inf", "1 2"])
+def test_a_cell_that_is_no_plain_number_is_no_value(cell):
+    (values,) = read_table([f"time,lon,lat,NO2\n1,51.5,25.3,{cell}\n2,51.5,25.3, +2.5e0\t\n".encode()]).values
+    assert values.value.tolist() == [2.5]
+
+
 def readers(content):
     for read in (lambda data: read_bin([data], "NO2S.NO2"), read_ulog, lambda data: read_table([data])):
         yield lambda read=read: assemble("damaged", read(content))

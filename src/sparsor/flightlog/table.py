@@ -34,6 +34,7 @@ _NAMES: Final = {
 }
 _MEANINGS: Final = {name: meaning for meaning, names in _NAMES.items() for name in names.split()}
 _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "usec": 1e-6, "ns": 1e-9, "m": 1.0, "deg": 1.0}
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_VALUES: Final = frozenset(("clock", "used"))  # of our own samples
 _LONGEST_LINE: Final = 1 << 22
 _VALID_UNIX_S = 946_684_800.0
@@ -149,7 +150,7 @@ def _rows(blocks: Iterable[bytes]) -> Iterator[list[str]]:
             (row,) = csv.reader([text], delimiter=delimiter)
         except csv.Error:
             row = []
-        yield [cell.strip() if delimiter == "," else cell.strip().replace(",", ".") for cell in row]
+        yield [(cell if delimiter == "," else cell.replace(",", ".")).strip(" \t") for cell in row]
 
 
 def _columns(
@@ -190,10 +191,9 @@ def _is_value(place: int, name: str, meanings: dict[str, int]) -> bool:
 
 
 def _number(cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
+    if _NUMBER.fullmatch(cell) is None:  # `float` takes underscores, other scripts' digits and separators too
         return math.nan
+    value = float(cell)
     return value if math.isfinite(value) else math.nan
 
 
