@@ -41,10 +41,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a mission is flown: the grid, the area it was asked for, the cells inside, what is kept out of."""
+    """Where a mission is flown.
+
+    Parameters
+    ----------
+    grid : Grid
+    area : Area or None
+        That was asked for, where it is not the whole box.
+    inside : array of bool (N,)
+        Cells of the area: the map and its error are over these.
+    allowed : array of bool (N,)
+        Those of them that may be flown: the others, in a keep-out, are estimated from around it.
+    full_coverage_m : float
+        Over the cells that may be flown.
+    zones : Zones or None
+        What is kept out of.
+    """
 
     grid: Grid
     area: Area | None
+    inside: NDArray[np.bool_]
     allowed: NDArray[np.bool_]
     full_coverage_m: float
     zones: Zones | None = None
@@ -120,6 +136,7 @@ class Prepared:
             budget=self.budget(spec),
             unit_rows=not asked.paper,
             improve=not asked.paper,
+            mapped=self.place.inside,
         )
 
 
@@ -168,13 +185,12 @@ def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
 
 
 def _place(grid: Grid, area: Area | None, zones: Zones | None) -> Place:
-    allowed = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
-    if zones is not None:
-        allowed = allowed & ~zones.holds(*grid.centres_deg())
+    inside = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
+    allowed = inside if zones is None else inside & ~zones.holds(*grid.centres_deg())
     if int(allowed.sum()) < 2:
         kept = " outside of what is kept out of" if zones is not None else ""
         raise MissionError(f"the area holds the centre of one cell at most{kept}; draw a larger one")
-    return Place(grid, area, allowed, grid.full_coverage_m(allowed), zones)
+    return Place(grid, area, inside, allowed, grid.full_coverage_m(allowed), zones)
 
 
 def _legs(place: Place, vehicle: Vehicle, speed_m_s: float, wind: SteadyWind) -> LegTable:

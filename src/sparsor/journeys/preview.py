@@ -38,7 +38,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             home=(float(home[0]), float(home[1])),
             fence=np.column_stack([fence.lon_deg, fence.lat_deg]),
             area=() if place.area is None else _rings(mission),
-            outside=None if place.allowed.all() else ~place.allowed,
+            outside=None if place.inside.all() else ~place.inside,
             caption=_caption(mission),
         )
     )
