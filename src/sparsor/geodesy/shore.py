@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 Side = Literal["land", "sea"]
 OTHER: Final[dict[Side, Side]] = {"land": "sea", "sea": "land"}
 QUARTER = 4  # sides of a quarter of a rounded margin
-SMOOTHED = 0.05  # of the margin: corners of it that lie closer to a line are left out, outward
+SMOOTHED = 0.05  # of the margin: by so much it is larger than asked for, so that it has fewer corners
+SMOOTHED_OF_BOX = 1e-4  # of the box's diagonal: the same, where cells are of kilometres
 RADII = 1.005  # the ellipsoid's radii of curvature over the latitudes of any box, from those at its middle
 SPARE_M = 100.0  # of what is added to the margin
 METRES_PER_DEGREE = 110_000.0  # of latitude, at least
@@ -98,6 +99,8 @@ def shore_of(land: Land, side: Side, *, box: BoundingBox, plane: LocalPlane, mar
     east, north = -west, plane.metres(plane.lon_deg, box.north_deg + up)[1]
     frame = shapely.box(west, south, east, north)
     other = ground if side == "sea" else frame.difference(ground)
-    step_m = SMOOTHED * grown_m
-    margin = other.buffer((grown_m + step_m) / inner(), quad_segs=QUARTER).simplify(step_m)
+    step_m = max(SMOOTHED * grown_m, SMOOTHED_OF_BOX * float(np.hypot(box.east_m, box.north_m))) / 2
+    # Each of the two simplifications moves an edge by a step at most: the two that are added hold what was there.
+    coarse = shapely.make_valid(other.simplify(step_m))
+    margin = coarse.buffer((grown_m + 2 * step_m) / inner(), quad_segs=QUARTER).simplify(step_m)
     return Shore(plane, margin.intersection(frame), side, ground, margin_m, land.source)

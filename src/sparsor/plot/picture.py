@@ -44,6 +44,14 @@ class MissionPicture:
         Corners of the inclusion fence; closed by the drawing.
     area : tuple of arrays (n, 2)
         Rings of the area's outline, when the area is not the whole box.
+    keep_outs : tuple of arrays (n, 2)
+        Rings of what is kept out of.
+    margins : tuple of arrays (n, 2)
+        Lines that neither a stop nor a leg between stops crosses: the margins of keep-outs and of the coast.
+    coast : tuple of arrays (n, 2), optional
+        The coastline that the mission keeps to one side of; None: the package's, where it has one.
+    coast_label : str
+        Whose it is.
     outside : array of bool (rows * cols,), optional
         Cells outside the area, greyed out.
     caption : tuple of str
@@ -69,6 +77,10 @@ class MissionPicture:
     home: tuple[float, float] | None = None
     fence: NDArray[np.float64] | None = None
     area: tuple[NDArray[np.float64], ...] = ()
+    keep_outs: tuple[NDArray[np.float64], ...] = ()
+    margins: tuple[NDArray[np.float64], ...] = ()
+    coast: tuple[NDArray[np.float64], ...] | None = None
+    coast_label: str = "coastline (GSHHG)"
     outside: NDArray[np.bool_] | None = None
     caption: tuple[str, ...] = ()
 
@@ -87,5 +99,6 @@ class MissionPicture:
         named = [("stops", self.stops), ("route", self.route), ("fence", self.fence)]
         named += [("transits", points) for points in self.transits]
         named += [("area", points) for points in self.area]
+        named += [("keep_outs", points) for points in self.keep_outs]
         named += [("home", None if self.home is None else np.array([self.home], dtype=np.float64))]
         return [(name, points) for name, points in named if points is not None]
