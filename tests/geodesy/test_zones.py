@@ -134,6 +134,16 @@ def test_simplified_is_outward(points: np.ndarray, most: int) -> None:
     assert simple.area <= shapely.oriented_envelope(area).area * 1.6 + 1
 
 
+@pytest.mark.parametrize("turn_deg", [10.0, 20.0, 33.7, 45.0, 56.2, 80.0, 120.0])
+def test_a_rounded_corner_is_the_margin_away(turn_deg: float) -> None:
+    """A corner where the outline turns by 33.7 degrees is rounded by a single side, if it is by the least."""
+    plane, turn = LocalPlane(51.5, 25.3), math.radians(turn_deg)
+    ring = [(-900.0, 0.0), (0.0, 0.0), (900 * math.cos(turn), -900 * math.sin(turn)), (-900.0, -2000.0)]
+    lon, lat = plane.degrees(ring).T
+    zones = made(plane, [KeepOut("corner", tuple(lon.tolist()), tuple(lat.tolist()))])
+    assert zones.area.exterior.distance(shapely.Polygon(ring)) >= MARGIN_M
+
+
 def test_too_many_are_refused() -> None:
     plane = LocalPlane(51.5, 25.3)
     circles = [KeepOut(str(n), (51.5 + n / 1000,), (25.3,), 10.0) for n in range(60)]

@@ -213,8 +213,11 @@ def bulge_m(leg_m: float, lat_deg: float) -> float:
 
 
 def inner() -> float:
-    """Return how much nearer the middle the sides of a rounded corner are than its points."""
-    return math.cos(math.pi / (4 * QUARTER))
+    """Return how much nearer the middle the sides of a rounded corner are than its points.
+
+    GEOS rounds the number of sides of a corner, so that a side may take one and a half times the angle asked for.
+    """
+    return math.cos(1.5 * math.pi / (4 * QUARTER))
 
 
 def _rounded(points: NDArray[np.float64]) -> Points:
