@@ -174,6 +174,17 @@ def test_the_example_is_read() -> None:
     assert (mast.name, mast.lon_deg, mast.lat_deg, mast.radius_m) == ("Mast", (51.5205,), (25.2915,), 150.0)
 
 
+def test_the_airport_is_an_example_and_says_so() -> None:
+    from pathlib import Path
+
+    path = Path(__file__).parents[2] / "geo" / "doha-airport.geojson"
+    (airport,) = read_keep_outs(path)
+    zones = made(LocalPlane(51.6, 25.27), [airport])
+    assert zones.holds(51.608, 25.273)  # where its runways are
+    assert not zones.holds(51.53, 25.28)  # the city
+    assert "NOT the official zone" in path.read_text()
+
+
 def test_kml_is_read(tmp_path: Path) -> None:
     path = tmp_path / "out.kml"
     path.write_text(

@@ -195,6 +195,10 @@ def test_what_is_kept_out_of_is_drawn_with_its_margin_and_the_coast_that_was_giv
     )
     assert mission_preview(kept) != mission_preview(plain) != mission_preview(replace(plain, coast=(coast,)))
     view = view_of(kept)
+    far = replace(kept, keep_outs=(ring, ring * 1.001))  # what reaches out of the map does not make it smaller
+    assert view_of(far) == view == view_of(plain)
+    with pytest.raises(ValueError, match="keep_outs has shape"):
+        replace(kept, keep_outs=(ring.ravel(),))
     _, labels = legend_entries(view, kept, coast=True)
     assert {"kept out of", "margin", "coastline (mine)"} <= set(labels)
     _, labels = legend_entries(view, replace(kept, coast=None), coast=False)

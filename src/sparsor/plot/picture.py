@@ -90,15 +90,18 @@ class MissionPicture:
             raise ValueError(f"the prior has shape {self.prior.shape}, the grid {self.shape}")
         if self.outside is not None and self.outside.shape != (rows * columns,):
             raise ValueError(f"the mask has shape {self.outside.shape}, the grid has {rows * columns} cells")
-        for name, points in self.outlines():
+        around = [(name, line) for name in ("keep_outs", "margins", "coast") for line in getattr(self, name) or ()]
+        for name, points in (*self.outlines(), *around):
             if points.ndim != 2 or points.shape[1] != 2:
                 raise ValueError(f"{name} has shape {points.shape}; points are rows of longitude and latitude")
 
     def outlines(self) -> list[tuple[str, NDArray[np.float64]]]:
-        """Return the name and the points of everything that is made of points, home included."""
+        """Return the name and the points of everything that the map is made large enough for, home included.
+
+        Keep-outs, margins and the coast are shown as far as they reach into it.
+        """
         named = [("stops", self.stops), ("route", self.route), ("fence", self.fence)]
         named += [("transits", points) for points in self.transits]
         named += [("area", points) for points in self.area]
-        named += [("keep_outs", points) for points in self.keep_outs]
         named += [("home", None if self.home is None else np.array([self.home], dtype=np.float64))]
         return [(name, points) for name, points in named if points is not None]
