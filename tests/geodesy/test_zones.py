@@ -134,6 +134,16 @@ def test_simplified_is_outward(points: np.ndarray, most: int) -> None:
     assert simple.area <= shapely.oriented_envelope(area).area * 1.6 + 1
 
 
+@pytest.mark.parametrize("turn_deg", [10.0, 20.0, 33.7, 45.0, 56.2, 80.0, 120.0])
+def test_a_rounded_corner_is_the_margin_away(turn_deg: float) -> None:
+    """A corner where the outline turns by 33.7 degrees is rounded by a single side, if it is by the least."""
+    plane, turn = LocalPlane(51.5, 25.3), math.radians(turn_deg)
+    ring = [(-900.0, 0.0), (0.0, 0.0), (900 * math.cos(turn), -900 * math.sin(turn)), (-900.0, -2000.0)]
+    lon, lat = plane.degrees(ring).T
+    zones = made(plane, [KeepOut("corner", tuple(lon.tolist()), tuple(lat.tolist()))])
+    assert zones.area.exterior.distance(shapely.Polygon(ring)) >= MARGIN_M
+
+
 def test_too_many_are_refused() -> None:
     plane = LocalPlane(51.5, 25.3)
     circles = [KeepOut(str(n), (51.5 + n / 1000,), (25.3,), 10.0) for n in range(60)]
@@ -162,6 +172,17 @@ def test_the_example_is_read() -> None:
     stadium, mast = read_keep_outs(Path(__file__).parents[2] / "geo" / "keep-out-example.geojson")
     assert (stadium.name, len(stadium.lon_deg), stadium.is_circle) == ("Stadium", 4, False)
     assert (mast.name, mast.lon_deg, mast.lat_deg, mast.radius_m) == ("Mast", (51.5205,), (25.2915,), 150.0)
+
+
+def test_the_airport_is_an_example_and_says_so() -> None:
+    from pathlib import Path
+
+    path = Path(__file__).parents[2] / "geo" / "doha-airport.geojson"
+    (airport,) = read_keep_outs(path)
+    zones = made(LocalPlane(51.6, 25.27), [airport])
+    assert zones.holds(51.608, 25.273)  # where its runways are
+    assert not zones.holds(51.53, 25.28)  # the city
+    assert "NOT the official zone" in path.read_text()
 
 
 def test_kml_is_read(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,7 @@ def test_what_was_written_is_read(tmp_path, grid, seed):
     content = sidecar_npz(sidecar)
     again = read_sidecar(write(tmp_path, content))
     assert again.grid == grid
+    assert again.kept_out is None
     for name in ("phi", "stops", "allowed"):
         written, read = getattr(sidecar, name), getattr(again, name)
         assert read.dtype == written.dtype
@@ -85,6 +87,17 @@ def test_what_was_written_is_read(tmp_path, grid, seed):
     for name in ARRAYS:  # the large ones are kept in single precision
         np.testing.assert_allclose(getattr(again.model, name), getattr(sidecar.model, name), rtol=1e-6, atol=1e-7)
     assert sidecar_npz(again) == content
+
+
+def test_what_is_kept_out_of_is_a_mask_of_its_own(tmp_path):
+    sidecar = make()
+    kept_out = np.arange(sidecar.grid.size) == 3
+    again = read_sidecar(write(tmp_path, sidecar_npz(replace(sidecar, kept_out=kept_out))))
+    assert again.kept_out.tolist() == kept_out.tolist()
+    # A file without one, as those before had none, is the same bytes as ever.
+    assert sidecar_npz(replace(sidecar, kept_out=~sidecar.allowed & False)) == sidecar_npz(sidecar)
+    with pytest.raises(MissionError, match="do not fit a grid"):
+        read_sidecar(write(tmp_path, sidecar_npz(replace(sidecar, kept_out=kept_out[1:] | True))))
 
 
 def test_it_holds_plain_arrays_that_numpy_reads_without_pickle(tmp_path):

@@ -18,6 +18,7 @@ from pyproj import Geod
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.plot import MissionPicture, mission_preview
 from sparsor.plot.furniture import graticule_lines, scale_bar
+from sparsor.plot.legend import legend_entries
 from sparsor.plot.view import MAP_HEIGHT_IN, MAP_WIDTH_IN, view_of
 
 GEOD = Geod(ellps="WGS84")
@@ -180,3 +181,26 @@ def test_importing_plot_does_not_import_matplotlib() -> None:
     code = "import sys, sparsor.plot; print([m for m in ('matplotlib', 'shapely') if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["doha", "antimeridian"])
+def test_what_is_kept_out_of_is_drawn_with_its_margin_and_the_coast_that_was_given(name: str) -> None:
+    plain = picture_of(BOXES[name])
+    west, south, _, north = BOXES[name]
+    inch = (north - south) / 8
+    ring = np.array([[west + inch, south + inch], [west + 2 * inch, south + inch], [west + inch, south + 2 * inch]])
+    coast = np.array([[west + 3 * inch, south], [west + 4 * inch, north]])
+    kept = replace(
+        plain, keep_outs=(ring,), margins=(ring + 0.1 * inch,), coast=(coast,), coast_label="coastline (mine)"
+    )
+    assert mission_preview(kept) != mission_preview(plain) != mission_preview(replace(plain, coast=(coast,)))
+    view = view_of(kept)
+    far = replace(kept, keep_outs=(ring, ring * 1.001))  # what reaches out of the map does not make it smaller
+    assert view_of(far) == view == view_of(plain)
+    with pytest.raises(ValueError, match="keep_outs has shape"):
+        replace(kept, keep_outs=(ring.ravel(),))
+    _, labels = legend_entries(view, kept, coast=True)
+    assert {"kept out of", "margin", "coastline (mine)"} <= set(labels)
+    _, labels = legend_entries(view, replace(kept, coast=None), coast=False)
+    assert "its margin" in labels
+    assert not {"kept out of", "margin"} & set(legend_entries(view, plain, coast=False)[1])

@@ -248,6 +248,22 @@ def plan(
         float | None,
         _option(FLIGHT, "Least distance to a keep-out, m (default: 30).", "--keep-out-margin", metavar="M"),
     ] = None,
+    land_only: Annotated[
+        bool, typer.Option("--land-only", help="Fly and map no cell of sea.", rich_help_panel=WHERE)
+    ] = False,
+    sea_only: Annotated[
+        bool, typer.Option("--sea-only", help="Fly and map no cell of land.", rich_help_panel=WHERE)
+    ] = False,
+    coastline: Annotated[
+        Path | None,
+        _option(WHERE, "Polygons of land (default: GSHHG, 40-64 E, 18-34 N).", "--coastline", metavar="FILE"),
+    ] = None,
+    coastline_accuracy: Annotated[
+        float | None,
+        _option(
+            WHERE, "How good that file is, kept as a margin, m (default: 500).", "--coastline-accuracy", metavar="M"
+        ),
+    ] = None,
     sensor_profile: Annotated[
         str | None,
         _option(
@@ -312,6 +328,7 @@ def plan(
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
         },
+        "coast": _coast(coastline, coastline_accuracy, land_only=land_only, sea_only=sea_only),
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},
     }
@@ -347,6 +364,17 @@ def plan(
     typer.echo(f"written to {folder}: {', '.join(written)}")
 
 
+def _coast(file: Path | None, accuracy_m: float | None, *, land_only: bool, sea_only: bool) -> dict[str, Any] | None:
+    """Return the section of the coast, None where nothing of it was asked for."""
+    from sparsor.errors import MissionError
+
+    if land_only and sea_only:
+        raise MissionError("--land-only and --sea-only leave nothing to fly: give one of them")
+    side = "land" if land_only else "sea" if sea_only else None
+    asked = {"side": side, "file": file, "accuracy_m": accuracy_m}
+    return asked if any(value is not None for value in asked.values()) else None
+
+
 def _request(
     given: dict[str, Any], mission_file: Path | None, output: Path | None
 ) -> tuple[MissionSpecification, Path]:
@@ -380,6 +408,8 @@ def _request(
 def _as_typed(message: str) -> str:
     """Return a message about keys of mission.toml as one about the options that were typed for them."""
     message = message.replace("search.time_s", "--time").replace("prior.time", "--field-time")
+    message = message.replace("coast.file", "--coastline").replace("coast.accuracy_m", "--coastline-accuracy")
+    message = re.sub(r"\bcoast: ", "--coastline: ", message)
     message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)

@@ -20,6 +20,8 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "stops": int(found.stops.size),
         "cells_measured": int(found.phi.any(axis=0).sum()),
         "cells_flown_over": mission.cells_flown_over,
+        "cells_mapped": int(mission.place.inside.sum()),
+        "cells_kept_out": int((mission.place.inside & ~mission.place.allowed).sum()),
         "path_length_m": mission.path_length_m,
         "flown_length_m": mission.flown_length_m,
         "path_length_cells": found.length_cells,
@@ -53,6 +55,7 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             "box",
             f"{box.east_m / 1000:.4g} km east-west, {box.north_m / 1000:.4g} km north-south, {rows} x {columns} cells",
         ),
+        *_map(mission),
         ("stops", _stops(mission)),
         (
             "distance",
@@ -97,6 +100,18 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             ),
         ]
     return table
+
+
+def _map(mission: PlannedMission) -> list[tuple[str, str]]:
+    """Return the row of what the map is of, where it is not simply the box."""
+    place = mission.place
+    kept_out = int((place.inside & ~place.allowed).sum())
+    if place.inside.all() and not kept_out:
+        return []
+    of = "" if place.shore is None else f" of {place.shore.side}"
+    near = "" if place.shore is None else f"; coastline good to {place.shore.margin_m:g} m, kept as a margin"
+    said = f", {kept_out} of them not flown to and estimated from around" if kept_out else ""
+    return [("map", f"{int(place.inside.sum())} cells{of}{said}{near}")]
 
 
 def _stops(mission: PlannedMission) -> str:

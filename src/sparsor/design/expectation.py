@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def expected_errors(problem: Problem, candidate: Candidate, mean: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the mean ``|s - s_hat| / |s - mean(s)|`` over the validation maps, allowed cells only.
+    """Return the mean ``|s - s_hat| / |s - mean(s)|`` over the validation maps, cells of the map only.
 
     The search chose Phi on these very maps, so the figure is optimistic; maps without contrast do not count.
 
@@ -41,8 +41,8 @@ def expected_errors(problem: Problem, candidate: Candidate, mean: NDArray[np.flo
         with one_blas_thread():
             codes = lasso(phi @ problem.psi, problem.maps @ phi.T, problem.lasso_weight)
             estimate = codes @ problem.psi.T + mean
-        allowed = problem.legs.allowed
-        each = centred_relative_error(truth[:, allowed], estimate[:, allowed])
+        counted = problem.counted
+        each = centred_relative_error(truth[:, counted], estimate[:, counted])
         if np.isnan(each).all():
             raise DesignError("the validation maps have no contrast inside the area: no error can be expected of them")
         errors.append(float(np.nanmean(each)))

@@ -50,6 +50,8 @@ class Problem:
         Routes beyond it are rejected.
     unit_rows, improve : bool
         The default reading of mu and of the path; both False is the paper's.
+    mapped : array of bool (N,), optional
+        Cells that the error counts, those among them that may not be flown too; default: those that may be flown.
     """
 
     psi: NDArray[np.float64]
@@ -60,11 +62,17 @@ class Problem:
     budget: Budget | None = None
     unit_rows: bool = True
     improve: bool = True
+    mapped: NDArray[np.bool_] | None = None
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Cells that the error counts."""
+        return self.legs.allowed if self.mapped is None else self.mapped
 
     @cached_property
     def span(self) -> Span:
         """The maps and atoms as the search compares them."""
-        return span_of(self.psi, self.maps, self.legs.allowed)
+        return span_of(self.psi, self.maps, self.counted)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.lasso_weight) and self.lasso_weight > 0):

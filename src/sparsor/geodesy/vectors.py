@@ -19,16 +19,19 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 FORMATS = "give GeoJSON, KML, KMZ or another vector format that GDAL reads"
+_A = {"area": "an area", "coastline": "a coastline"}
 DEGREES = (None, "EPSG:4326", "OGC:CRS84")
 
 
-def read_polygons(path: Path) -> list[tuple[str, Polygon]]:
+def read_polygons(path: Path, what: str = "area") -> list[tuple[str, Polygon]]:
     """Read every polygon of every layer of a vector file.
 
     Parameters
     ----------
     path : Path
         The file; points and lines in it are passed over.
+    what : str
+        What the file is called when something is wrong with it.
 
     Returns
     -------
@@ -42,7 +45,7 @@ def read_polygons(path: Path) -> list[tuple[str, Polygon]]:
         When the file is missing, is not a vector file, is empty or holds no polygon.
     """
     if not path.exists():
-        raise AreaError(f"there is no area file '{path}'; {FORMATS}")
+        raise AreaError(f"there is no {what} file '{path}'; {FORMATS}")
     from shapely import Polygon
 
     parts = [
@@ -52,11 +55,11 @@ def read_polygons(path: Path) -> list[tuple[str, Polygon]]:
         if not part.is_empty
     ]
     if not parts:
-        raise AreaError(f"'{path}' is empty: it holds no geometry; an area needs a polygon")
+        raise AreaError(f"'{path}' is empty: it holds no geometry; {_A[what]} needs a polygon")
     polygons = [(name, _in_wgs84(path, part, crs)) for name, part, crs in parts if isinstance(part, Polygon)]
     if not polygons:
         kinds = " and ".join(sorted({part.geom_type for _, part, _ in parts}))
-        raise AreaError(f"'{path}' holds nothing but {kinds} geometry; an area needs a polygon")
+        raise AreaError(f"'{path}' holds nothing but {kinds} geometry; {_A[what]} needs a polygon")
     return polygons
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from sparsor.errors import AreaError
+from sparsor.geodesy.barred import Barred
 from sparsor.geodesy.outward import MITRE, corners, simplified_outward
 from sparsor.geodesy.plane import LocalPlane
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
     from shapely import Polygon
-    from shapely.geometry.base import BaseGeometry
 
     from sparsor.geodesy.keepouts import KeepOut
 
@@ -34,41 +34,25 @@ MOST_BULGE_M = 25.0
 
 
 @dataclass(frozen=True)
-class Zones:
+class Zones(Barred):
     """What is kept out of, over one mission.
 
     Parameters
     ----------
-    plane : LocalPlane
-        In whose metres `area` is; straight lines there are straight in longitude and latitude.
     polygons : tuple of lists of (longitude, latitude)
         Exclusion fences: each holds its keep-out, with no more corners than the autopilot has room for.
     circles : tuple of (longitude, latitude, radius in metres)
-    area : geometry
-        All of them with their margin: no leg touches it.
     names : tuple of str
     """
 
-    plane: LocalPlane
     polygons: tuple[Points, ...]
     circles: tuple[tuple[float, float, float], ...]
-    area: BaseGeometry
     names: tuple[str, ...]
 
     @property
     def fence_points(self) -> int:
         """How many fence points they take."""
         return sum(map(len, self.polygons)) + len(self.circles)
-
-    def holds(self, lon_deg: ArrayLike, lat_deg: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether places lie in a keep-out or its margin."""
-        east, north = np.moveaxis(self.plane.metres(lon_deg, lat_deg), -1, 0)
-        return np.asarray(shapely.intersects_xy(self._prepared, east, north), dtype=np.bool_)
-
-    def crossed(self, lon0: ArrayLike, lat0: ArrayLike, lon1: ArrayLike, lat1: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether legs cross a keep-out or its margin, (n,)."""
-        ends = np.stack([self.plane.metres(lon0, lat0), self.plane.metres(lon1, lat1)], axis=-2)
-        return np.asarray(shapely.intersects(self._prepared, shapely.linestrings(ends)), dtype=np.bool_)
 
     def way(self, start: tuple[float, float], end: tuple[float, float]) -> Points | None:
         """Return the points between two places on the shortest way past; none where it is straight; None for no way."""
@@ -100,11 +84,6 @@ class Zones:
                 seen = candidates[self._sees(goals[candidates], node)]
                 best[seen] = length + away[seen]
         return best
-
-    @cached_property
-    def _prepared(self) -> BaseGeometry:
-        shapely.prepare(self.area)
-        return self.area
 
     @cached_property
     def _corners(self) -> NDArray[np.float64]:
@@ -175,7 +154,7 @@ def zones_of(
     AreaError
         When there are too many keep-outs for the autopilot's store of fence points.
     """
-    bulge_m = min(longest_leg_m**2 * math.tan(math.radians(abs(plane.lat_deg))) / (8.0 * EARTH_M), MOST_BULGE_M)
+    whole_m = margin_m + bulge_m(longest_leg_m, plane.lat_deg)
     round_ones = [one for one in keep_outs if one.is_circle]
     shapes = _merged([one for one in keep_outs if not one.is_circle], plane)
     room = most_points - len(round_ones)
@@ -186,17 +165,15 @@ def zones_of(
         )
     fenced = _within(shapes, room)
     written = [_rounded(plane.degrees(shapely.get_coordinates(one.exterior)[:-1])) for one in fenced]
-    areas = [
-        _with_margin(shapely.Polygon(plane.metres(*np.array(one).T)), margin_m + bulge_m, plane) for one in written
-    ]
+    areas = [_with_margin(shapely.Polygon(plane.metres(*np.array(one).T)), whole_m, plane) for one in written]
     circles = tuple(
         (round(one.lon_deg[0], 7), round(one.lat_deg[0], 7), round(one.radius_m + ROUNDING_M, 2)) for one in round_ones
     )
     for lon, lat, radius_m in circles:
-        middle = shapely.Point(0.0, 0.0).buffer((radius_m + margin_m + bulge_m) / _inner(), quad_segs=QUARTER)
+        middle = shapely.Point(0.0, 0.0).buffer((radius_m + whole_m) / inner(), quad_segs=QUARTER)
         areas.append(_moved(middle, LocalPlane(lon, lat), plane))
     names = tuple(one.name for one in keep_outs)
-    return Zones(plane, tuple(written), circles, shapely.union_all(areas), names)
+    return Zones(plane, shapely.union_all(areas), tuple(written), circles, names)
 
 
 def _merged(keep_outs: list[KeepOut], plane: LocalPlane) -> list[Polygon]:
@@ -221,7 +198,7 @@ def _with_margin(polygon: Polygon, margin_m: float, plane: LocalPlane) -> Polygo
     """Return a polygon grown by a margin that is measured where the polygon lies."""
     lon, lat = plane.degrees(shapely.get_coordinates(polygon.centroid)[0])
     own = LocalPlane(float(lon), float(lat))
-    grown = _moved(polygon, plane, own).buffer(margin_m * 1.002 / _inner(), quad_segs=QUARTER)
+    grown = _moved(polygon, plane, own).buffer(margin_m * 1.002 / inner(), quad_segs=QUARTER)
     return _moved(grown, own, plane)
 
 
@@ -230,9 +207,17 @@ def _moved(polygon: Polygon, start: LocalPlane, end: LocalPlane) -> Polygon:
     return shapely.transform(polygon, lambda points: end.metres(*start.degrees(points).T))
 
 
-def _inner() -> float:
-    """Return how much nearer the middle the sides of a rounded corner are than its points."""
-    return math.cos(math.pi / (4 * QUARTER))
+def bulge_m(leg_m: float, lat_deg: float) -> float:
+    """Return how far a leg of some length may bulge out of the straight line on the map, metres; 25 at most."""
+    return min(leg_m**2 * math.tan(math.radians(abs(lat_deg))) / (8.0 * EARTH_M), MOST_BULGE_M)
+
+
+def inner() -> float:
+    """Return how much nearer the middle the sides of a rounded corner are than its points.
+
+    GEOS rounds the number of sides of a corner, so that a side may take one and a half times the angle asked for.
+    """
+    return math.cos(1.5 * math.pi / (4 * QUARTER))
 
 
 def _rounded(points: NDArray[np.float64]) -> Points:

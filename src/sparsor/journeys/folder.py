@@ -125,7 +125,8 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
-        allowed=mission.place.allowed,
+        allowed=mission.place.inside,
+        kept_out=mission.place.inside & ~mission.place.allowed,
         model=mission.prior.model,
         phi=candidate.phi,
         stops=candidate.stops if flown is None else candidate.stops[np.concatenate(flown.orders)],

@@ -125,13 +125,19 @@ def _holds(sidecar: Sidecar) -> str:
     return f"{sidecar.hold_s:g} s {each}"
 
 
+def _kept_out(sidecar: Sidecar) -> str:
+    count = 0 if sidecar.kept_out is None else int(sidecar.kept_out.sum())
+    return f", {count} of them kept out of and estimated from around" if count else ""
+
+
 def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
     box = sidecar.grid.box
     known = "" if sidecar.home_altitude_known else " (unknown, written as 0)"
     lines = (
         f"{path}: the sidecar of mission '{sidecar.name}'",
         f"Box: {' '.join(f'{side:g}' for side in box.as_tuple())} (west south east north), "
-        f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside.",
+        f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside"
+        f"{_kept_out(sidecar)}.",
         f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {_holds(sidecar)}.",
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
         f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast (|s - s'| / |s - mean(s)|).",

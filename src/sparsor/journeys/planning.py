@@ -15,6 +15,7 @@ from sparsor.errors import MissionError
 from sparsor.geodesy.lengths import distance_m, path_length_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
+from sparsor.journeys.keepingout import said_of_shore
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
@@ -237,7 +238,7 @@ def _assemble(
             mission = replace(mission, sorties=cut)
             warnings = (*warnings, _said_of(cut, mission))
     _check(mission, prepared.wind)
-    said = (*warnings, *advice(mission), *plan.warnings, *prior.warnings)
+    said = (*warnings, *advice(mission), *said_of_shore(mission), *plan.warnings, *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
 

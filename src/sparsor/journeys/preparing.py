@@ -13,7 +13,8 @@ from sparsor.design.sparsity import check_sparsity
 from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
-from sparsor.journeys.keepingout import barred_legs, mission_zones
+from sparsor.geodesy.shore import OTHER
+from sparsor.journeys.keepingout import barred_legs, mission_shore, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.mission.specification import PAPER_ROWS
@@ -35,19 +36,40 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.core.workers import Workers
+    from sparsor.geodesy.shore import Shore
     from sparsor.geodesy.zones import Zones
     from sparsor.mission.specification import MissionSpecification
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a mission is flown: the grid, the area it was asked for, the cells inside, what is kept out of."""
+    """Where a mission is flown.
+
+    Parameters
+    ----------
+    grid : Grid
+    area : Area or None
+        That was asked for, where it is not the whole box.
+    inside : array of bool (N,)
+        Cells of the area: the map and its error are over these.
+    allowed : array of bool (N,)
+        Those of them that may be flown: the others, in a keep-out, are estimated from around it.
+    full_coverage_m : float
+        Over the cells that may be flown.
+    zones : Zones or None
+        What is kept out of.
+    shore : Shore or None
+        Land or sea, where one of them alone was asked for: cells on the other side are not in the map, as those outside
+        of an area; those on this side within the coastline's accuracy are in it, and are not flown to.
+    """
 
     grid: Grid
     area: Area | None
+    inside: NDArray[np.bool_]
     allowed: NDArray[np.bool_]
     full_coverage_m: float
     zones: Zones | None = None
+    shore: Shore | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +142,7 @@ class Prepared:
             budget=self.budget(spec),
             unit_rows=not asked.paper,
             improve=not asked.paper,
+            mapped=self.place.inside,
         )
 
 
@@ -143,7 +166,7 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     box, area = _where(spec)
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
     grid = Grid(box, prior.model.shape)
-    place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot))
+    place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot), mission_shore(spec, grid))
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
     wind = spec.flight.steady_wind
     check_wind(vehicle, wind, speed)
@@ -167,14 +190,19 @@ def _where(spec: MissionSpecification) -> tuple[BoundingBox, Area | None]:
     return area.box, None if area.is_box else area
 
 
-def _place(grid: Grid, area: Area | None, zones: Zones | None) -> Place:
-    allowed = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
-    if zones is not None:
-        allowed = allowed & ~zones.holds(*grid.centres_deg())
+def _place(grid: Grid, area: Area | None, zones: Zones | None, shore: Shore | None) -> Place:
+    centres = grid.centres_deg()
+    inside = np.ones(grid.size, dtype=np.bool_) if area is None else cells_inside(grid, area)
+    if shore is not None:
+        inside = inside & shore.asked_for(*centres)
+    allowed = inside if zones is None else inside & ~zones.holds(*centres)
+    if shore is not None:
+        allowed = allowed & ~shore.holds(*centres)
     if int(allowed.sum()) < 2:
-        kept = " outside of what is kept out of" if zones is not None else ""
+        kept = "" if shore is None else f" of {shore.side} {shore.margin_m:g} m or more from the {OTHER[shore.side]}"
+        kept += " outside of what is kept out of" if zones is not None else ""
         raise MissionError(f"the area holds the centre of one cell at most{kept}; draw a larger one")
-    return Place(grid, area, allowed, grid.full_coverage_m(allowed), zones)
+    return Place(grid, area, inside, allowed, grid.full_coverage_m(allowed), zones, shore)
 
 
 def _legs(place: Place, vehicle: Vehicle, speed_m_s: float, wind: SteadyWind) -> LegTable:
@@ -182,4 +210,5 @@ def _legs(place: Place, vehicle: Vehicle, speed_m_s: float, wind: SteadyWind) ->
     cell_unit_m = place.full_coverage_m / (int(place.allowed.sum()) - 1)
     seconds = leg_seconds_between(place.grid, length_m, vehicle, speed_m_s, wind)
     table = LegTable(place.grid.shape, length_m, seconds, cell_unit_m, place.allowed)
-    return table.kept_inside(None if place.zones is None else barred_legs(place.zones, place.grid, place.allowed))
+    grounds = [ground for ground in (place.zones, place.shore) if ground is not None]
+    return table.kept_inside(barred_legs(grounds, place.grid, place.allowed) if grounds else None)

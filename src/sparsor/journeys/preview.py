@@ -6,13 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sparsor.geodesy.plane import LocalPlane
 from sparsor.mission import transits
 from sparsor.plot import MissionPicture, mission_preview
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Iterable
 
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from sparsor.geodesy import BoundingBox
+    from sparsor.geodesy.barred import Barred
     from sparsor.journeys.planning import PlannedMission
+    from sparsor.journeys.preparing import Place
+    from sparsor.mission.specification import MissionSpecification
+
+LONGEST_NAME = 18  # that the legend has room for
 
 
 def preview_png(mission: PlannedMission) -> bytes:
@@ -38,10 +48,50 @@ def preview_png(mission: PlannedMission) -> bytes:
             home=(float(home[0]), float(home[1])),
             fence=np.column_stack([fence.lon_deg, fence.lat_deg]),
             area=() if place.area is None else _rings(mission),
-            outside=None if place.allowed.all() else ~place.allowed,
+            keep_outs=_keep_outs(place),
+            margins=_margins(place),
+            coast=None if place.shore is None else _in_box(place.shore, place.shore.land.boundary, place.grid.box),
+            coast_label=f"coastline ({_whose(mission.specification)})",
+            outside=None if place.inside.all() else ~place.inside,
             caption=_caption(mission),
         )
     )
+
+
+def _keep_outs(place: Place) -> tuple[NDArray[np.float64], ...]:
+    """Return the rings of the exclusion fences, circles as rings too."""
+    if place.zones is None:
+        return ()
+    turn = np.linspace(0.0, 2 * np.pi, 73)
+    around = np.column_stack([np.cos(turn), np.sin(turn)])
+    circles = [LocalPlane(lon, lat).degrees(radius_m * around) for lon, lat, radius_m in place.zones.circles]
+    return (*(np.array(ring) for ring in place.zones.polygons), *circles)
+
+
+def _margins(place: Place) -> tuple[NDArray[np.float64], ...]:
+    import shapely
+
+    kept = () if place.zones is None else _degrees(place.zones, shapely.get_parts(place.zones.area.boundary))
+    return kept if place.shore is None else (*kept, *_in_box(place.shore, place.shore.area.boundary, place.grid.box))
+
+
+def _whose(spec: MissionSpecification) -> str:
+    own = None if spec.coast is None else spec.coast.file
+    return "GSHHG" if own is None else own.name[:LONGEST_NAME]
+
+
+def _in_box(ground: Barred, lines: BaseGeometry, box: BoundingBox) -> tuple[NDArray[np.float64], ...]:
+    """Return the parts in the box of lines on a ground's plane, in degrees: around it lies where they were cut off."""
+    import shapely
+
+    east, north = ground.plane.metres(box.east_deg, box.north_deg)
+    return _degrees(ground, shapely.get_parts(shapely.clip_by_rect(lines, -east, -north, east, north)))
+
+
+def _degrees(ground: Barred, lines: Iterable[BaseGeometry]) -> tuple[NDArray[np.float64], ...]:
+    import shapely
+
+    return tuple(ground.plane.degrees(shapely.get_coordinates(line)) for line in lines)
 
 
 def _ways(mission: PlannedMission) -> tuple[NDArray[np.float64], ...]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.core.workers import Workers
-    from sparsor.design import LegTable, Problem
+    from sparsor.design import Problem
     from sparsor.journeys.preparing import Prepared
     from sparsor.mission.specification import MissionSpecification
     from sparsor.prior.model import Model
@@ -74,13 +74,13 @@ def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_
     """
     assert problem.budget is not None
     with one_blas_thread():
-        covariance = training_covariance(model, problem.legs.allowed)
+        covariance = training_covariance(model, problem.counted)
     # The profile's own noise cancels: the maps are as much larger as the sensor is fit to tell.
     noise_s = sensor.interval_s / SPREAD_OVER_NOISE**2 if sensor.noise_sd > 0 else 0.0
     answer = Sensor(READING_NOISE, noise_s, sensor.t90_s / T90_OVER_TAU)
     # A dwell of a budget of time is told apart from a stop that is flown through.
     budget = replace(problem.budget, per_stop=0.0)
-    return Task(covariance, problem.legs, budget, answer, hold_s, braking_s)
+    return Task(covariance, problem.legs, budget, answer, hold_s, braking_s, problem.mapped)
 
 
 def search_refined(
@@ -125,7 +125,7 @@ def search_refined(
     )
     stops, dwells = apart(route.stops)
     phi = np.eye(legs.size, dtype=np.bool_)[legs.cells_under(stops)]
-    inside = model.validation[:, legs.allowed]
+    inside = model.validation[:, problem.counted]
     squared = route.expected_error * float(inside.var(axis=1).mean()) * inside.shape[1]
     candidate = Candidate(
         sample=0,
@@ -139,7 +139,7 @@ def search_refined(
         theta=0,
         dwells=dwells,
     )
-    error = linear_expectation(model, legs, *task.readings(route.stops), spec.search.seed)
+    error = linear_expectation(model, problem.counted, *task.readings(route.stops), spec.search.seed)
     return Refined(candidate, error, route.interrupted)
 
 
@@ -164,14 +164,15 @@ def apart(stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 
 def linear_expectation(
-    model: Model, legs: LegTable, rows: NDArray[np.float64], variance: NDArray[np.float64], seed: int
+    model: Model, counted: NDArray[np.bool_], rows: NDArray[np.float64], variance: NDArray[np.float64], seed: int
 ) -> float:
     """Return the mean ``|s - s_hat| / |s - mean(s)|`` over the validation maps, by the best linear decoder.
 
     Parameters
     ----------
     model : Model
-    legs : LegTable
+    counted : array of bool (N,)
+        Cells of the map.
     rows, variance : arrays (m, N), (m,)
         What the flight measures, see `Task.readings`.
     seed : int
@@ -181,10 +182,10 @@ def linear_expectation(
     DesignError
         When no validation map has contrast inside the area.
     """
-    maps = unit_shapes(model.validation, legs.allowed)
+    maps = unit_shapes(model.validation, counted)
     if not len(maps):
         raise DesignError("the validation maps have no contrast inside the area: no error can be expected of them")
     readings = Measurements(rows, rows @ maps[0], variance)
-    setting = Setting(model, readings, legs.allowed, np.zeros(len(rows)), seed)
+    setting = Setting(model, readings, counted, np.zeros(len(rows)), seed)
     with one_blas_thread():
         return min(one.error for one in candidates(setting, LINEAR, amplitude=1.0).values())

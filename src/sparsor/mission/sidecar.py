@@ -34,7 +34,7 @@ class Sidecar:
         Of the mission.
     grid : Grid
     allowed : array of bool (N,)
-        Cells inside the area.
+        Cells inside the area: those of the map.
     model : Model
     phi : array of bool (M, N)
         The planned measurement matrix.
@@ -56,6 +56,9 @@ class Sidecar:
         What will measure, when that was said.
     passing : tuple of (longitude, latitude)
         Waypoints that only lead past a keep-out and are no stops.
+    kept_out : array of bool (N,) or None
+        Cells inside the area that are not flown to, since they lie in a keep-out or its margin; None: nothing was
+        said of them, in a sidecar of an earlier version.
     """
 
     name: str
@@ -73,6 +76,7 @@ class Sidecar:
     plans: Mapping[str, str]
     sensor: SensorProfile | None = None
     passing: tuple[tuple[float, float], ...] = ()
+    kept_out: NDArray[np.bool_] | None = None
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -100,6 +104,7 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
             "allowed": sidecar.allowed,
             "phi": sidecar.phi,
             "stops": sidecar.stops,
+            **({} if sidecar.kept_out is None or not sidecar.kept_out.any() else {"kept_out": sidecar.kept_out}),
             **model_arrays(sidecar.model),
         }
     )
@@ -142,6 +147,8 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
     grid = Grid(BoundingBox(*(float(side) for side in about["bbox"])), (about["shape"][0], about["shape"][1]))
     phi, stops, allowed = arrays["phi"], arrays["stops"].astype(np.int64), arrays["allowed"]
     fits = phi.ndim == 2 and phi.shape[1] == allowed.size == grid.size
+    kept_out = arrays.get("kept_out")
+    fits = fits and (kept_out is None or kept_out.size == grid.size)
     if not fits or stops.min(initial=0) < 0 or stops.max(initial=0) >= grid.size:
         raise ValueError(f"its arrays do not fit a grid of {grid.shape[0]} x {grid.shape[1]}")
     return Sidecar(
@@ -160,4 +167,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         plans={str(key): str(value) for key, value in about["plans"].items()},
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
+        kept_out=None if kept_out is None else kept_out.astype(np.bool_),
     )

@@ -187,6 +187,24 @@ class FlightSection(_Section):
         return CALM if self.wind is None else SteadyWind(*self.wind)
 
 
+class CoastSection(_Section):
+    """Land or sea alone, by the packaged coastline or one of the user's own."""
+
+    side: Literal["land", "sea"] | None = None
+    file: Path | None = None
+    accuracy_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] | None = None
+
+    @model_validator(mode="after")
+    def _together(self) -> Self:
+        if self.side is None:
+            raise ValueError("a coastline alone asks for nothing: add --land-only or --sea-only")
+        if self.accuracy_m is not None and self.file is None:
+            raise ValueError(
+                "an accuracy is that of a coastline of your own (--coastline FILE); the packaged one is good to 500 m"
+            )
+        return self
+
+
 class SensorSection(_Section):
     """What measures: a packaged profile's name or a profile's file, or the packaged sensor with another response."""
 
@@ -214,6 +232,7 @@ class MissionSpecification(_Section):
     prior: PriorSection = PriorSection()
     search: SearchSection = Field(default_factory=lambda: SearchSection.model_validate({}))
     flight: FlightSection = FlightSection()
+    coast: CoastSection | None = None
     sensor: SensorSection | None = None
     output: OutputSection = OutputSection()
 
@@ -222,7 +241,8 @@ class MissionSpecification(_Section):
         """The files that this mission is made from."""
         sensor = None if self.sensor is None else self.sensor.profile
         profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
-        paths = (self.area.file, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
+        coast = None if self.coast is None else self.coast.file
+        paths = (self.area.file, coast, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
         return tuple(path for path in paths if path is not None)
 
     @field_validator("name")
@@ -353,6 +373,7 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     return spec.model_copy(
         update={
             "area": moved(spec.area, "file"),
+            "coast": spec.coast and moved(spec.coast, "file"),
             "prior": moved(spec.prior, "field", "model"),
             "flight": flight,
             "sensor": sensor,

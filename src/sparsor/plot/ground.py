@@ -105,12 +105,13 @@ def draw_cells(axes: Axes, view: View, picture: MissionPicture) -> None:
     axes.plot([west, east, east, west, west], [south, south, north, north, south], **style.BOX)
 
 
-def draw_coast(axes: Axes, view: View) -> bool:
+def draw_coast(axes: Axes, view: View, picture: MissionPicture) -> bool:
     """Draw the coastline, finer where it is crowded, without specks; return whether there is one."""
     from matplotlib.collections import LineCollection
 
-    pieces = coastline(view.west_deg, view.south_deg, view.east_deg, view.north_deg)
+    pieces = coastline(view.west_deg, view.south_deg, view.east_deg, view.north_deg) if picture.coast is None else []
     lines = [np.column_stack(piece) for piece in pieces]
+    lines += [view.unwrapped(line) for line in picture.coast or ()]
     lines = [line for line in lines if np.ptp(view.inches(line), axis=0).max() > SPECK_IN]
     crowded = view.m_per_inch > CROWDED_M_PER_INCH
     for how, width in (
@@ -122,11 +123,15 @@ def draw_coast(axes: Axes, view: View) -> bool:
 
 
 def draw_outlines(axes: Axes, view: View, picture: MissionPicture) -> None:
-    """Draw the area's outline and the fence."""
+    """Draw the area's outline, what is kept out of, and the fence."""
     for ring in picture.area:
         lon, lat = view.unwrapped(_closed(ring)).T
         axes.plot(lon, lat, **style.AREA_CASING)
         axes.plot(lon, lat, **style.AREA)
+    for ring in picture.keep_outs:
+        axes.fill(*view.unwrapped(_closed(ring)).T, **style.KEEP_OUT)
+    for line in picture.margins:
+        axes.plot(*view.unwrapped(line).T, **style.KEPT_OFF)
     if picture.fence is not None:
         axes.plot(*view.unwrapped(_closed(picture.fence)).T, **style.FENCE)
 

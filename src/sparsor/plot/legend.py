@@ -41,10 +41,14 @@ def legend_entries(
         entries.append((_line(style.FENCE), "fence"))
     if picture.area:
         entries.append((_line(style.AREA), "area"))
+    if picture.keep_outs:
+        entries.append((Patch(**style.KEEP_OUT), "kept out of"))
+    if picture.margins:
+        entries.append((_line(style.KEPT_OFF), "its margin" if picture.coast is None else "margin"))
     if picture.outside is not None and picture.outside.any():
         entries.append((Patch(facecolor=style.GREYED_OUT, edgecolor=style.FAINT_INK, linewidth=0.4), outside))
     if coast:
-        entries.append((_line({**style.COAST, "linewidth": 0.75}), "coastline (GSHHG)"))
+        entries.append((_line({**style.COAST, "linewidth": 0.75}), picture.coast_label))
     return [handle for handle, _ in entries], [label for _, label in entries]
 
 

@@ -44,6 +44,14 @@ class MissionPicture:
         Corners of the inclusion fence; closed by the drawing.
     area : tuple of arrays (n, 2)
         Rings of the area's outline, when the area is not the whole box.
+    keep_outs : tuple of arrays (n, 2)
+        Rings of what is kept out of.
+    margins : tuple of arrays (n, 2)
+        Lines that neither a stop nor a leg between stops crosses: the margins of keep-outs and of the coast.
+    coast : tuple of arrays (n, 2), optional
+        The coastline that the mission keeps to one side of; None: the package's, where it has one.
+    coast_label : str
+        Whose it is.
     outside : array of bool (rows * cols,), optional
         Cells outside the area, greyed out.
     caption : tuple of str
@@ -69,6 +77,10 @@ class MissionPicture:
     home: tuple[float, float] | None = None
     fence: NDArray[np.float64] | None = None
     area: tuple[NDArray[np.float64], ...] = ()
+    keep_outs: tuple[NDArray[np.float64], ...] = ()
+    margins: tuple[NDArray[np.float64], ...] = ()
+    coast: tuple[NDArray[np.float64], ...] | None = None
+    coast_label: str = "coastline (GSHHG)"
     outside: NDArray[np.bool_] | None = None
     caption: tuple[str, ...] = ()
 
@@ -78,12 +90,16 @@ class MissionPicture:
             raise ValueError(f"the prior has shape {self.prior.shape}, the grid {self.shape}")
         if self.outside is not None and self.outside.shape != (rows * columns,):
             raise ValueError(f"the mask has shape {self.outside.shape}, the grid has {rows * columns} cells")
-        for name, points in self.outlines():
+        around = [(name, line) for name in ("keep_outs", "margins", "coast") for line in getattr(self, name) or ()]
+        for name, points in (*self.outlines(), *around):
             if points.ndim != 2 or points.shape[1] != 2:
                 raise ValueError(f"{name} has shape {points.shape}; points are rows of longitude and latitude")
 
     def outlines(self) -> list[tuple[str, NDArray[np.float64]]]:
-        """Return the name and the points of everything that is made of points, home included."""
+        """Return the name and the points of everything that the map is made large enough for, home included.
+
+        Keep-outs, margins and the coast are shown as far as they reach into it.
+        """
         named = [("stops", self.stops), ("route", self.route), ("fence", self.fence)]
         named += [("transits", points) for points in self.transits]
         named += [("area", points) for points in self.area]

@@ -43,7 +43,7 @@ def _draw(figure: Figure, layout: Layout, view: View, picture: MissionPicture) -
     prior = ground.draw_prior(axes, view, picture)
     ground.draw_outside(axes, view, picture)
     ground.draw_cells(axes, view, picture)
-    coast = ground.draw_coast(axes, view)
+    coast = ground.draw_coast(axes, view, picture)
     ground.draw_outlines(axes, view, picture)
     _draw_flight(axes, view, picture)
     furniture.draw_graticule(axes, view)

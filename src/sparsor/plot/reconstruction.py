@@ -153,7 +153,7 @@ def _draw_panel(figure: Figure, layout: Layout, view: View, picture: MapPicture,
     ground.draw_outside(axes, view, panel.ground)
     if max(panel.ground.shape) <= MOST_CELL_LINES:
         ground.draw_cells(axes, view, panel.ground)
-    coast = ground.draw_coast(axes, view)
+    coast = ground.draw_coast(axes, view, panel.ground)
     _draw_flown(axes, view, picture, panel, coloured[0])
     furniture.draw_graticule(axes, view)
     furniture.draw_north_and_scale(figure, layout, view)

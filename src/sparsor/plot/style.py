@@ -68,6 +68,14 @@ LEFT_OUT: Style = {
     "zorder": 6.1,
 }
 FENCE: Style = {"color": VERMILLION, "linewidth": 1.1, "dashes": (5, 2.5), "zorder": 3.5}
+KEEP_OUT: Style = {
+    "facecolor": (0.84, 0.37, 0.0, 0.22),
+    "edgecolor": VERMILLION,
+    "linewidth": 1.1,
+    "hatch": "//",
+    "zorder": 3.3,
+}
+KEPT_OFF: Style = {"color": VERMILLION, "linewidth": 0.7, "dashes": (1.5, 1.5), "zorder": 3.4}
 AREA_CASING: Style = {"color": "white", "linewidth": 2.0, "zorder": 3}
 AREA: Style = {"color": INK, "linewidth": 1.0, "zorder": 3.1}
 BOX: Style = {"color": INK, "linewidth": 0.7, "zorder": 2.9}

@@ -33,7 +33,7 @@ class Belief(NamedTuple):
     residual : array of float64 (N,)
         Variance of a cell around what the factor says.
     allowed : array of bool (N,)
-        Cells that count and may be flown.
+        Cells that may be flown.
     """
 
     factor: NDArray[np.float64]
@@ -44,22 +44,29 @@ class Belief(NamedTuple):
 
 
 def belief(
-    covariance: NDArray[np.float64], allowed: NDArray[np.bool_], *, rank: int = 96, least: float = 0.0
+    covariance: NDArray[np.float64],
+    allowed: NDArray[np.bool_],
+    *,
+    mapped: NDArray[np.bool_] | None = None,
+    rank: int = 96,
+    least: float = 0.0,
 ) -> Belief:
     """Return the leading components of a covariance as the search needs them.
 
     Parameters
     ----------
     covariance : array of float64 (N, N)
-        Of differences from the map's mean; mean variance 1 over the allowed cells.
+        Of differences from the map's mean; mean variance 1 over the cells that count.
     allowed : array of bool (N,)
-        Cells that count and may be flown.
+        Cells that may be flown.
+    mapped : array of bool (N,), optional
+        Cells that count; default: those that may be flown.
     rank : int
         Most components.
     least : float
         Components of less variance, over all cells together, are left out.
     """
-    cells = np.flatnonzero(allowed)
+    cells = np.flatnonzero(allowed if mapped is None else mapped)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
     leading = values.argsort()[::-1][:rank]
     leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), least)]

@@ -79,6 +79,8 @@ class Task:
         A dwell, which a route may make at any stop, several times over; 0: none.
     braking_s : float
         What a dwell takes beside that.
+    mapped : array of bool (N,), optional
+        Cells that the error counts, those among them that may not be flown too; default: those that may be flown.
     """
 
     covariance: NDArray[np.float64]
@@ -87,6 +89,7 @@ class Task:
     sensor: Sensor = _EXACT
     hold_s: float = 0.0
     braking_s: float = 0.0
+    mapped: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         size = self.legs.size
@@ -95,6 +98,11 @@ class Task:
         for name, value in {**self.sensor._asdict(), "hold_s": self.hold_s, "braking_s": self.braking_s}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Cells that the error counts."""
+        return self.legs.allowed if self.mapped is None else self.mapped
 
     @property
     def reading_noise(self) -> float:
@@ -106,7 +114,7 @@ class Task:
         """Variance of a component of the maps, over all cells together, that the longest flight hardly tells of."""
         table = self.legs.length if self.budget.measure == "distance" else self.legs.seconds
         readings = self.budget.limit / self.legs.step(table)
-        return _HARDLY * self.reading_noise * float(self.legs.allowed.sum()) / readings
+        return _HARDLY * self.reading_noise * float(self.counted.sum()) / readings
 
     def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
@@ -123,7 +131,7 @@ class Route:
         Turning points in path order; every cell under the legs between them is measured. At one that follows itself
         the vehicle dwells.
     expected_error : float
-        Mean posterior variance over the allowed cells as a share of the maps' variance.
+        Mean posterior variance over the cells that count as a share of the maps' variance.
     used : float
         Of the budget.
     interrupted : bool
@@ -202,7 +210,9 @@ class _Search:
         self.over_cells = flyover(task.legs, hold_s=task.hold_s)
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
-        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, least=least) for one in _STAGES]
+        self.beliefs = [
+            belief(task.covariance, allowed, mapped=task.counted, rank=one.rank, least=least) for one in _STAGES
+        ]
         self.hands = workers_of(workers)
         self.shared = [self.hands.share((one, self.over_cells, task.sensor, self.costs)) for one in self.beliefs]
         self.begun, self.seconds = time.monotonic(), seconds
