@@ -15,7 +15,7 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.design.refined.dense import inner_products, inverse_root, solve
 
-_LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
+LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
 _LEAST_NOISE = 1e-6  # of the map's variance
 
 
@@ -25,7 +25,7 @@ class Belief(NamedTuple):
     Parameters
     ----------
     factor : array of float64 (N, r + 1)
-        Components of the covariance, and a last column of ones for the level; 0 outside the area.
+        Components of the covariance, and a last column of ones for the level where that is unknown; 0 outside the area.
     spread : array of float64 (r + 1,)
         Variance of each coefficient.
     size : array of float64 (r + 1,)
@@ -44,7 +44,12 @@ class Belief(NamedTuple):
 
 
 def belief(
-    covariance: NDArray[np.float64], allowed: NDArray[np.bool_], *, rank: int = 96, least: float = 0.0
+    covariance: NDArray[np.float64],
+    allowed: NDArray[np.bool_],
+    *,
+    rank: int = 96,
+    least: float = 0.0,
+    level_variance: float = LEVEL_VARIANCE,
 ) -> Belief:
     """Return the leading components of a covariance as the search needs them.
 
@@ -58,20 +63,25 @@ def belief(
         Most components.
     least : float
         Components of less variance, over all cells together, are left out.
+    level_variance : float
+        Of the level, which the covariance says nothing of; 0 where it does: then there is no column for it.
     """
     cells = np.flatnonzero(allowed)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
     leading = values.argsort()[::-1][:rank]
-    leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), least)]
+    telling = values[leading] > max(_LEAST_NOISE * values.max(), least)
+    telling[0] |= level_variance == 0  # something has to be left to tell
+    leading = leading[telling]
     # The signs that LAPACK gives are its own; they do not change any result.
-    inside = vectors[:, leading] * np.sqrt(values[leading])
+    inside = vectors[:, leading] * np.sqrt(np.maximum(values[leading], 0.0))
     left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
-    factor = np.zeros((allowed.size, leading.size + 1))
-    factor[cells, :-1] = inside
-    factor[cells, -1] = 1.0
+    levels = int(level_variance > 0)
+    factor = np.zeros((allowed.size, leading.size + levels))
+    factor[cells, : leading.size] = inside
+    factor[cells, leading.size :] = 1.0
     residual = np.zeros(allowed.size)
     residual[cells] = left + _LEAST_NOISE
-    spread = np.append(np.ones(leading.size), _LEVEL_VARIANCE)
+    spread = np.append(np.ones(leading.size), np.full(levels, level_variance))
     return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, residual, allowed)
 
 

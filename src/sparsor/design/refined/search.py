@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event, Lock
 from typing import TYPE_CHECKING
 
@@ -19,10 +19,11 @@ from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
 from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.refined.annealing import anneal, route_error
+from sparsor.design.refined.conditioning import conditioned
 from sparsor.design.refined.costs import costs, shortest_pair, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.flyover import flyover, passes
-from sparsor.design.refined.posterior import belief
+from sparsor.design.refined.posterior import LEVEL_VARIANCE, belief
 from sparsor.design.refined.readings import Sensor, weights
 from sparsor.design.refined.starts import starts
 from sparsor.errors import BudgetError, DesignError
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.design.budget import Budget
+    from sparsor.design.decoders.noise import Noise
     from sparsor.design.legs import LegTable
     from sparsor.design.refined.costs import Costs
     from sparsor.design.refined.flyover import Flyover
@@ -79,6 +81,8 @@ class Task:
         A dwell, which a route may make at any stop, several times over; 0: none.
     braking_s : float
         What a dwell takes beside that.
+    level_variance : float
+        Of the maps' level, which is as good as unknown; 0 where the covariance holds what is known of it, see `after`.
     """
 
     covariance: NDArray[np.float64]
@@ -87,12 +91,14 @@ class Task:
     sensor: Sensor = _EXACT
     hold_s: float = 0.0
     braking_s: float = 0.0
+    level_variance: float = LEVEL_VARIANCE
 
     def __post_init__(self) -> None:
         size = self.legs.size
         if self.covariance.shape != (size, size):
             raise DesignError(f"a covariance of shape {self.covariance.shape} does not fit a grid of {size} cells")
-        for name, value in {**self.sensor._asdict(), "hold_s": self.hold_s, "braking_s": self.braking_s}.items():
+        given = {"hold_s": self.hold_s, "braking_s": self.braking_s, "level_variance": self.level_variance}
+        for name, value in {**self.sensor._asdict(), **given}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
 
@@ -111,6 +117,20 @@ class Task:
     def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
         return weights(self.sensor, *passes(flyover(self.legs, hold_s=self.hold_s), stops), self.legs.size)
+
+    def after(self, rows: NDArray[np.float64], noise: Noise) -> Task:
+        """Return the task of a further flight over maps that were measured before.
+
+        Parameters
+        ----------
+        rows : array of float64 (m, N)
+            Weights of the cells in each reading.
+        noise : Noise
+            Of the readings, for maps of a mean variance of 1.
+        """
+        return replace(
+            self, covariance=conditioned(self.covariance, self.level_variance, rows, noise), level_variance=0.0
+        )
 
 
 @dataclass(frozen=True)
@@ -202,7 +222,10 @@ class _Search:
         self.over_cells = flyover(task.legs, hold_s=task.hold_s)
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
-        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, least=least) for one in _STAGES]
+        self.beliefs = [
+            belief(task.covariance, allowed, rank=one.rank, least=least, level_variance=task.level_variance)
+            for one in _STAGES
+        ]
         self.hands = workers_of(workers)
         self.shared = [self.hands.share((one, self.over_cells, task.sensor, self.costs)) for one in self.beliefs]
         self.begun, self.seconds = time.monotonic(), seconds
