@@ -17,6 +17,7 @@ from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
+from sparsor.journeys.resuming import flown_before
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
 from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan, transits
 from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
+    from sparsor.journeys.resuming import Before
     from sparsor.mission.specification import MissionSpecification
 
 _STRAIGHT = (
@@ -71,6 +73,8 @@ class PlannedMission:
     sorties : Sorties or None
         The flights that the route is cut into, where one is not enough and they were asked for; length, times and
         errors above are of the uncut route.
+    before : Before or None
+        What was flown of the mission that this one resumes; the errors above are of all flights together.
     """
 
     specification: MissionSpecification
@@ -90,6 +94,7 @@ class PlannedMission:
     expected_relative_error_cells: float
     warnings: tuple[str, ...]
     sorties: Sorties | None = None
+    before: Before | None = None
 
     @property
     def usable_s(self) -> float:
@@ -121,13 +126,19 @@ class PlannedMission:
 
 
 def plan_mission(
-    spec: MissionSpecification, *, workers: Workers | int | None = None, progress: Progress = silent
+    spec: MissionSpecification,
+    *,
+    before: Before | None = None,
+    workers: Workers | int | None = None,
+    progress: Progress = silent,
 ) -> PlannedMission:
     """Plan a mission; nothing is written.
 
     Parameters
     ----------
     spec : MissionSpecification
+    before : Before, optional
+        What was flown of the mission that it resumes, where that was read already.
     workers : Workers or int, optional
         Who searches and learns, see `sparsor.core.schedulers.workers_at`; a number is one of threads, one a core by
         default. The answer is the same for any.
@@ -140,7 +151,9 @@ def plan_mission(
     """
     hands = workers_of(workers)
     prepared = prepare(spec, workers=hands, progress=progress)
-    return plan_prepared(spec, prepared, workers=hands, progress=progress)
+    if spec.resume is not None and before is None:
+        before = flown_before(spec.resume, prepared.sensor, progress=progress)
+    return plan_prepared(spec, prepared, before=before, workers=hands, progress=progress)
 
 
 def plan_prepared(
@@ -148,6 +161,7 @@ def plan_prepared(
     prepared: Prepared,
     *,
     begin: Sequence[NDArray[np.int64]] = (),
+    before: Before | None = None,
     workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> PlannedMission:
@@ -159,6 +173,8 @@ def plan_prepared(
     prepared : Prepared
     begin : sequence of arrays of int64
         Routes that the refined search may begin from.
+    before : Before, optional
+        What was flown of the mission that it resumes.
     workers : Workers or int
     progress : Progress
 
@@ -169,9 +185,12 @@ def plan_prepared(
     """
     problem = prepared.problem(spec)
     if spec.search.planner == "refined":
-        found = search_refined(prepared, problem, spec, begin=begin, workers=workers, progress=progress)
-        warnings = (_INTERRUPTED,) if found.interrupted else ()
-        return _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), warnings)
+        known = None if before is None else before.known
+        begin = begin if before is None else (*begin, before.covered.left)
+        found = search_refined(prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress)
+        warnings = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
+        made = _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), warnings)
+        return replace(made, before=before)
     candidate, weights = search_algorithm_1(problem, spec, workers=workers, progress=progress)
     expected = expected_errors(problem, candidate, prepared.prior.model.mean)
     return _assemble(spec, prepared, candidate, weights, expected, ())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,6 +56,8 @@ class Sidecar:
         What will measure, when that was said.
     passing : tuple of (longitude, latitude)
         Waypoints that only lead past a keep-out and are no stops.
+    flown : array of int64 (k,)
+        Of a resumed mission: stops that earlier flights measured already, in their flight order.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Sidecar:
     plans: Mapping[str, str]
     sensor: SensorProfile | None = None
     passing: tuple[tuple[float, float], ...] = ()
+    flown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -100,6 +103,7 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
             "allowed": sidecar.allowed,
             "phi": sidecar.phi,
             "stops": sidecar.stops,
+            **({"flown": sidecar.flown} if sidecar.flown.size else {}),
             **model_arrays(sidecar.model),
         }
     )
@@ -141,8 +145,10 @@ def content_hash(content: bytes) -> str:
 def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], model: Model) -> Sidecar:
     grid = Grid(BoundingBox(*(float(side) for side in about["bbox"])), (about["shape"][0], about["shape"][1]))
     phi, stops, allowed = arrays["phi"], arrays["stops"].astype(np.int64), arrays["allowed"]
+    flown = arrays.get("flown", np.zeros(0, dtype=np.int64)).astype(np.int64)
     fits = phi.ndim == 2 and phi.shape[1] == allowed.size == grid.size
-    if not fits or stops.min(initial=0) < 0 or stops.max(initial=0) >= grid.size:
+    every = np.concatenate((stops, flown))
+    if not fits or every.min(initial=0) < 0 or every.max(initial=0) >= grid.size:
         raise ValueError(f"its arrays do not fit a grid of {grid.shape[0]} x {grid.shape[1]}")
     return Sidecar(
         name=str(about["name"]),
@@ -160,4 +166,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         plans={str(key): str(value) for key, value in about["plans"].items()},
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
+        flown=flown,
     )

@@ -49,6 +49,22 @@ def test_two_flights_leave_what_one_of_all_their_readings_leaves(sensor):
     assert found < 0.8 * route_error(belief(COVARIANCE, ALL, rank=CELLS), flyover(LEGS), sensor, SECOND)
 
 
+@pytest.mark.parametrize("sensor", [Sensor(0.01, 0.02), Sensor(0.01, 0.02, 1.7)])
+def test_a_sensor_whose_zero_moved_in_between_is_a_drift_of_the_second_flight_alone(sensor):
+    one = task(sensor)
+    (rows, variance), (more, of_more) = one.readings(FIRST), one.readings(SECOND)
+    after = one.after(rows, noise(variance), zero_variance=0.7)
+    drift = np.sqrt(0.7) * np.repeat([0.0, 1.0], [len(rows), len(more)])
+    together = conditioned(
+        COVARIANCE, LEVEL_VARIANCE, np.vstack((rows, more)), Noise(np.concatenate((variance, of_more)), drift)
+    )
+    known = belief(after.covariance, ALL, rank=CELLS, level_variance=0.0, zero_variance=0.7)
+    found = route_error(known, flyover(LEGS), sensor, SECOND)
+    assert found == pytest.approx(together.trace() / CELLS, rel=1e-3)
+    steady = belief(after.covariance, ALL, rank=CELLS, level_variance=0.0)
+    assert found > 1.05 * route_error(steady, flyover(LEGS), sensor, SECOND)
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),

@@ -25,11 +25,12 @@ class Belief(NamedTuple):
     Parameters
     ----------
     factor : array of float64 (N, r + 1)
-        Components of the covariance, and a last column of ones for the level where that is unknown; 0 outside the area.
+        Components of the covariance, then a column of ones for the level, and one for the sensor's zero, where they
+        are unknown; 0 outside the area.
     spread : array of float64 (r + 1,)
         Variance of each coefficient.
     size : array of float64 (r + 1,)
-        Mean square of each column over the cells that count.
+        Mean square of each column over the cells that count; 0 for the sensor's zero, which is no part of the map.
     residual : array of float64 (N,)
         Variance of a cell around what the factor says.
     allowed : array of bool (N,)
@@ -50,6 +51,7 @@ def belief(
     rank: int = 96,
     least: float = 0.0,
     level_variance: float = LEVEL_VARIANCE,
+    zero_variance: float = 0.0,
 ) -> Belief:
     """Return the leading components of a covariance as the search needs them.
 
@@ -65,6 +67,9 @@ def belief(
         Components of less variance, over all cells together, are left out.
     level_variance : float
         Of the level, which the covariance says nothing of; 0 where it does: then there is no column for it.
+    zero_variance : float
+        Of what the sensor shows too much, the same in all readings of a flight; 0 where its zero is that of the map's
+        level.
     """
     cells = np.flatnonzero(allowed)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
@@ -75,14 +80,16 @@ def belief(
     # The signs that LAPACK gives are its own; they do not change any result.
     inside = vectors[:, leading] * np.sqrt(np.maximum(values[leading], 0.0))
     left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
-    levels = int(level_variance > 0)
-    factor = np.zeros((allowed.size, leading.size + levels))
+    shared = np.array([level_variance, zero_variance])
+    factor = np.zeros((allowed.size, leading.size + np.count_nonzero(shared)))
     factor[cells, : leading.size] = inside
     factor[cells, leading.size :] = 1.0
     residual = np.zeros(allowed.size)
     residual[cells] = left + _LEAST_NOISE
-    spread = np.append(np.ones(leading.size), np.full(levels, level_variance))
-    return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, residual, allowed)
+    spread = np.append(np.ones(leading.size), shared[shared > 0])
+    size = np.square(factor).sum(axis=0) / cells.size
+    size[size.size - int(zero_variance > 0) :] = 0.0
+    return Belief(factor, spread, size, residual, allowed)
 
 
 @njit(cache=True, nogil=True)

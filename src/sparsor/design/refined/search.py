@@ -83,6 +83,8 @@ class Task:
         What a dwell takes beside that.
     level_variance : float
         Of the maps' level, which is as good as unknown; 0 where the covariance holds what is known of it, see `after`.
+    zero_variance : float
+        Of what the sensor shows too much all through the flight.
     """
 
     covariance: NDArray[np.float64]
@@ -92,13 +94,15 @@ class Task:
     hold_s: float = 0.0
     braking_s: float = 0.0
     level_variance: float = LEVEL_VARIANCE
+    zero_variance: float = 0.0
 
     def __post_init__(self) -> None:
         size = self.legs.size
         if self.covariance.shape != (size, size):
             raise DesignError(f"a covariance of shape {self.covariance.shape} does not fit a grid of {size} cells")
-        given = {"hold_s": self.hold_s, "braking_s": self.braking_s, "level_variance": self.level_variance}
-        for name, value in {**self.sensor._asdict(), **given}.items():
+        given = {"hold_s": self.hold_s, "braking_s": self.braking_s}
+        unknown = {"level_variance": self.level_variance, "zero_variance": self.zero_variance}
+        for name, value in {**self.sensor._asdict(), **given, **unknown}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
 
@@ -118,7 +122,7 @@ class Task:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
         return weights(self.sensor, *passes(flyover(self.legs, hold_s=self.hold_s), stops), self.legs.size)
 
-    def after(self, rows: NDArray[np.float64], noise: Noise) -> Task:
+    def after(self, rows: NDArray[np.float64], noise: Noise, zero_variance: float = 0.0) -> Task:
         """Return the task of a further flight over maps that were measured before.
 
         Parameters
@@ -127,10 +131,11 @@ class Task:
             Weights of the cells in each reading.
         noise : Noise
             Of the readings, for maps of a mean variance of 1.
+        zero_variance : float
+            Of how far the sensor's zero moves until the further flight.
         """
-        return replace(
-            self, covariance=conditioned(self.covariance, self.level_variance, rows, noise), level_variance=0.0
-        )
+        covariance = conditioned(self.covariance, self.level_variance, rows, noise)
+        return replace(self, covariance=covariance, level_variance=0.0, zero_variance=zero_variance)
 
 
 @dataclass(frozen=True)
@@ -222,10 +227,8 @@ class _Search:
         self.over_cells = flyover(task.legs, hold_s=task.hold_s)
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
-        self.beliefs = [
-            belief(task.covariance, allowed, rank=one.rank, least=least, level_variance=task.level_variance)
-            for one in _STAGES
-        ]
+        shared = {"level_variance": task.level_variance, "zero_variance": task.zero_variance}
+        self.beliefs = [belief(task.covariance, allowed, rank=one.rank, least=least, **shared) for one in _STAGES]
         self.hands = workers_of(workers)
         self.shared = [self.hands.share((one, self.over_cells, task.sensor, self.costs)) for one in self.beliefs]
         self.begun, self.seconds = time.monotonic(), seconds
