@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
+    from sparsor.journeys.refining import Known
     from sparsor.journeys.resuming import Before
     from sparsor.mission.specification import MissionSpecification
 
@@ -185,7 +186,7 @@ def plan_prepared(
     """
     problem = prepared.problem(spec)
     if spec.search.planner == "refined":
-        known = None if before is None else before.known
+        known = None if before is None else _from_home(before.known, spec, prepared)
         begin = begin if before is None else (*begin, before.covered.left)
         found = search_refined(prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress)
         warnings = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
@@ -258,6 +259,14 @@ def _assemble(
     _check(mission, prepared.wind)
     said = (*warnings, *advice(mission), *plan.warnings, *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
+
+
+def _from_home(known: Known, spec: MissionSpecification, prepared: Prepared) -> Known:
+    """Return what is known with the cell of home, over which the sensor comes to what it knows."""
+    if spec.flight.home is None:
+        return known
+    cell = int(prepared.place.grid.cell_at(*spec.flight.home))
+    return replace(known, home=cell) if cell >= 0 else known
 
 
 def _check(mission: PlannedMission, wind: SteadyWind) -> None:

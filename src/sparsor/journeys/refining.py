@@ -54,12 +54,15 @@ class Known:
         Variance of the noise of one reading of the sensor, as it was found; of those to come too.
     zero_sd : float
         How far the sensor's zero will have moved by the next flight.
+    home : int or None
+        Cell from which that one takes off, where that is on the grid.
     """
 
     rows: NDArray[np.float64]
     noise: Noise
     of_a_reading: float
     zero_sd: float
+    home: int | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def refined_task(
     # A dwell of a budget of time is told apart from a stop that is flown through.
     budget = replace(problem.budget, per_stop=0.0)
     task = Task(covariance, problem.legs, budget, answer, hold_s, braking_s)
-    return task if known is None else task.after(known.rows, known.noise, known.zero_sd**2)
+    return task if known is None else task.after(known.rows, known.noise, known.zero_sd**2, known.home)
 
 
 def search_refined(

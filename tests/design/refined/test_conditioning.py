@@ -65,6 +65,24 @@ def test_a_sensor_whose_zero_moved_in_between_is_a_drift_of_the_second_flight_al
     assert found > 1.05 * route_error(steady, flyover(LEGS), sensor, SECOND)
 
 
+@pytest.mark.parametrize("sensor", [Sensor(0.01, 0.02), Sensor(0.01, 0.02, 1.7)])
+def test_the_ways_from_and_to_home_are_measured_and_cost_nothing_of_a_distance(sensor):
+    one, home = task(sensor), 24
+    rows, variance = one.readings(FIRST)
+    after = one.after(rows, noise(variance), home=home)
+    way = np.concatenate(([home], SECOND, [home]))
+    for found, wanted in zip(after.readings(SECOND), one.readings(way), strict=True):
+        np.testing.assert_array_equal(found, wanted)
+    for found, wanted in zip(after.readings(way), one.readings(way), strict=True):  # no dwell at home
+        np.testing.assert_array_equal(found, wanted)
+    barred = np.zeros((CELLS, CELLS), dtype=bool)
+    barred[home, SECOND[-1]] = barred[SECOND[-1], home] = True
+    shut = Task(COVARIANCE, one.legs.kept_inside(barred), one.budget, sensor, home=home)
+    np.testing.assert_array_equal(shut.readings(SECOND)[0], one.readings(way[:-1])[0])  # it leads round something
+    route = refine(after, seed=0, iterations=200)
+    assert route.used == pytest.approx(LEGS.path_length(route.stops))
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),

@@ -85,6 +85,8 @@ class Task:
         Of the maps' level, which is as good as unknown; 0 where the covariance holds what is known of it, see `after`.
     zero_variance : float
         Of what the sensor shows too much all through the flight.
+    home : int, optional
+        Cell of home, where what is flown over on the ways from and to it counts as measured.
     """
 
     covariance: NDArray[np.float64]
@@ -95,6 +97,7 @@ class Task:
     braking_s: float = 0.0
     level_variance: float = LEVEL_VARIANCE
     zero_variance: float = 0.0
+    home: int | None = None
 
     def __post_init__(self) -> None:
         size = self.legs.size
@@ -112,6 +115,11 @@ class Task:
         return self.sensor.noise + self.sensor.noise_s / self.legs.step(self.legs.seconds)
 
     @property
+    def over(self) -> Flyover:
+        """What is under its routes."""
+        return flyover(self.legs, hold_s=self.hold_s, home=self.home)
+
+    @property
     def least_telling(self) -> float:
         """Variance of a component of the maps, over all cells together, that the longest flight hardly tells of."""
         table = self.legs.length if self.budget.measure == "distance" else self.legs.seconds
@@ -120,9 +128,11 @@ class Task:
 
     def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
-        return weights(self.sensor, *passes(flyover(self.legs, hold_s=self.hold_s), stops), self.legs.size)
+        return weights(self.sensor, *passes(self.over, stops), self.legs.size)
 
-    def after(self, rows: NDArray[np.float64], noise: Noise, zero_variance: float = 0.0) -> Task:
+    def after(
+        self, rows: NDArray[np.float64], noise: Noise, zero_variance: float = 0.0, home: int | None = None
+    ) -> Task:
         """Return the task of a further flight over maps that were measured before.
 
         Parameters
@@ -133,9 +143,11 @@ class Task:
             Of the readings, for maps of a mean variance of 1.
         zero_variance : float
             Of how far the sensor's zero moves until the further flight.
+        home : int, optional
+            Cell from which that one takes off: its way over cells that are known tells the sensor's zero.
         """
         covariance = conditioned(self.covariance, self.level_variance, rows, noise)
-        return replace(self, covariance=covariance, level_variance=0.0, zero_variance=zero_variance)
+        return replace(self, covariance=covariance, level_variance=0.0, zero_variance=zero_variance, home=home)
 
 
 @dataclass(frozen=True)
@@ -224,7 +236,7 @@ class _Search:
     ) -> None:
         allowed = task.legs.allowed
         self.task, self.seed, self.moves, self.progress = task, seed, iterations, progress
-        self.over_cells = flyover(task.legs, hold_s=task.hold_s)
+        self.over_cells = task.over
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
         shared = {"level_variance": task.level_variance, "zero_variance": task.zero_variance}
