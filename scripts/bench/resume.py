@@ -5,9 +5,11 @@ Held-out maps, in ppb with a spread of 13, are laid over a box of 2.45 km and fl
 (t90 30 s, noise 5 ppb, a drift of sd 5 ppb an hour), which loses a tenth of its samples. Each map is flown three times
 with the same sensor: the refined route without a break; the same cut at 40 % of its length, and what `generate-mission
 --resume` plans for the length that is left, flown after a pause in which the sensor goes on drifting; and, cut alike,
-the rest of the old route after the pause. What is logged goes through `measure` and one decoder as a user's logs do.
-Printed as Markdown for each split: the mean error |s - s'| / |s - mean(s)| of each, its mean ratio to the
-uninterrupted flight's map by map, with the standard error of that, and the same as the decoder states it.
+the rest of the old route after the pause. Home is the route's first stop; the ways from and to it are measured as they
+are in the air, but the log that was cut ends at the cut. What is logged goes through `measure` and one decoder as a
+user's logs do. Printed as Markdown for each split: the mean error |s - s'| / |s - mean(s)| of each, its mean ratio to
+the uninterrupted flight's map by map, with the standard error of that, the same as the decoder states it, and the
+kilometres flown over the stops and with the ways that are logged.
 
     scripts/bench/resume.py                                   the built-in field
     scripts/bench/resume.py --field FIELD.tif                 splits `random` and `blocked` of a field
@@ -42,7 +44,7 @@ from sparsor.journeys.resuming import known_of
 from sparsor.vehicle import load_sensor
 
 WAYS = ("uninterrupted", "resumed", "rest of the old route")
-COLUMNS = ("split", "flight", "error", "ratio", "+-", "stated", "stated ratio")
+COLUMNS = ("split", "flight", "error", "ratio", "+-", "stated", "stated ratio", "km over the stops", "with the ways")
 SENSOR = load_sensor()
 BUDGET, CUT = 0.10, 0.4
 CELL_M = SIDE_M / GRID.shape[0]
@@ -73,7 +75,6 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=60_000, help="of every search")
     parser.add_argument("--pause-s", type=float, default=1200.0)
     parser.add_argument("--bare", action="store_true", help="without the ways from and to home")
-    parser.add_argument("--zero", action="store_true")
     parser.add_argument("--drift", type=float, default=SENSOR.drift_sd_per_h, help="sd of the sensor's, ppb an hour")
     parser.add_argument("--decoder", default="blend")
     parser.add_argument("--random-seeds", type=int, default=3, help="how many of the random splits")
@@ -93,14 +94,14 @@ def main() -> None:
 
 
 def report(protocol, found) -> None:
-    """Print the figures of flights (n, ways, 2): errors, and as they are stated."""
+    """Print the figures of flights (n, ways, 4): errors, as they are stated, and lengths."""
     ratio = found / found[:, :1]
     for k, way in enumerate(WAYS):
-        error, stated = found[:, k].mean(axis=0)
+        error, stated, stops_m, flown_m = found[:, k].mean(axis=0)
         apart = ratio[:, k, 0].std(ddof=1) / np.sqrt(len(found))
         print(
             f"| {protocol} | {way} | {error:.3f} | {ratio[:, k, 0].mean():.3f} | {apart:.3f} | {stated:.3f} | "
-            f"{ratio[:, k, 1].mean():.3f} |",
+            f"{ratio[:, k, 1].mean():.3f} | {stops_m / 1000:.2f} | {flown_m / 1000:.2f} |",
             flush=True,
         )
 
@@ -156,21 +157,21 @@ def flown(job):
         done = covered(GRID, job.stops, part, np.ones(part.value.size, dtype=bool))
         known = known_of(measured, job.model, EVERYWHERE, job.sensor.drift_sd_per_h)
         known = replace(known, home=int(home[0]) if home.size else None)
-        if os.environ.get("ZERO"):
-            known = replace(known, zero_sd=0.0, home=None)
         task = task_of(job.model, BUDGET * (GRID.size - 1) * CELL_M - done.length_m, known)
         route = refine(task, seed=0, iterations=job.iterations, begin=(done.left,))
-        logs = [whole]
+        made = [figures(whole, truth, job, job.stops, home, 0.0)]
         for stops in (route.stops, done.left):
-            way = np.concatenate((home, stops, home))
-            further = fly(flight, air, draw, shares(way), 0.0).samples
-            logs.append(joined(part, later(further, begin_s, flight.drift_ppb_h)))
-        return [figures(log, truth, job) for log in logs]
+            further = fly(flight, air, draw, shares(np.concatenate((home, stops, home))), 0.0).samples
+            log = joined(part, later(further, begin_s, flight.drift_ppb_h))
+            made.append(figures(log, truth, job, stops, home, done.length_m))
+        return made
 
 
-def figures(log, truth, job):
+def figures(log, truth, job, stops, home, before_m):
     found = decode(measured_of(log, job).measurements, job.model, job.decoder)
-    return centred_relative_error(truth[None], found.values[None])[0], found.expected_relative_error
+    error = centred_relative_error(truth[None], found.values[None])[0]
+    way = np.concatenate((home, stops, home))
+    return error, found.expected_relative_error, before_m + length_m(stops), before_m + length_m(way)
 
 
 def measured_of(log, job):

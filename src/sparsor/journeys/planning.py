@@ -188,10 +188,21 @@ def plan_prepared(
     if spec.search.planner == "refined":
         known = None if before is None else _from_home(before.known, spec, prepared)
         begin = begin if before is None else (*begin, before.covered.left)
-        found = search_refined(prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress)
-        warnings = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
-        made = _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), warnings)
-        return replace(made, before=before)
+
+        def made(known: Known | None) -> PlannedMission:
+            found = search_refined(
+                prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress
+            )
+            said = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
+            planned = _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), said)
+            return replace(planned, before=before)
+
+        mission = made(known)
+        if known is None or known.home is None or mission.flyable:
+            return mission
+        # Ways that are measured are longer ones than the battery may allow.
+        shorter = made(replace(known, home=None))
+        return shorter if shorter.flyable else mission
     candidate, weights = search_algorithm_1(problem, spec, workers=workers, progress=progress)
     expected = expected_errors(problem, candidate, prepared.prior.model.mean)
     return _assemble(spec, prepared, candidate, weights, expected, ())
