@@ -91,6 +91,8 @@ def test_what_is_left_is_planned_beside_the_old_mission(here, tree):
     assert new.home[:2] == pytest.approx(old.home[:2], abs=1e-7)
     assert set(new.flown.tolist()) < set(old.stops.tolist())
     assert new.phi.any(axis=0).sum() > max(told["cells_measured"], result["cells_flown_over"])
+    inspected = here("sparsor", "inspect", "missions/doha-2/doha-2.npz")
+    assert f"{new.flown.size} more were measured by the flights that it resumes" in inspected.out
     document = tomllib.loads(Path("missions/doha-2/mission.toml").read_text(encoding="utf-8"))
     assert document["resume"] == {"mission": "../doha", "logs": ["../../doha.csv"]}
 
@@ -138,6 +140,19 @@ def test_a_budget_of_time_is_less_what_was_in_the_air(here):
     assert parse_budget(result["resumed"]["budget"]).value == pytest.approx(1500 - result["resumed"]["air_time_s"])
     assert result["flight_time_s"] <= 1500 - result["resumed"]["air_time_s"]
     assert result["plans"] == ["rest/rest.plan"]
+
+
+def test_sorties_that_were_all_flown_leave_nothing(here):
+    box = ("--bbox", *BOX, "--name", "far", "--budget", "30km", "--sorties", *SOON, "--t90", 0, "--json")
+    planned = here("generate-mission", *box)
+    assert planned.result["sorties"] > 1
+    logs = [
+        flight(Path(plan), Path(f"{number}.csv"), begin_s=BEGIN_S + 3000 * number)
+        for number, plan in enumerate(planned.result["plans"])
+    ]
+    ran = here("generate-mission", *(word for log in logs for word in ("--resume", log)), "--mission", "missions/far")
+    assert ran.code == 2
+    assert "nothing is left to plan" in ran.said
 
 
 def test_where_all_was_flown_nothing_is_planned(here, tree):
