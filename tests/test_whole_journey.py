@@ -80,7 +80,7 @@ def practice_flight(mission):
     return np.array(track), [one for one in rig.heard if one.get_type() == "GLOBAL_POSITION_INT"]
 
 
-def log_of(flown, seed, path):
+def log_of(flown, seed, path, begin_us=BEGIN_UNIX_US):
     """Write the .tlog of a flight with a sensor on board."""
     sensor = PracticeSensor(TRUTH, SENSOR, seed)
     messages = [(one.time_boot_ms, one) for one in flown.positions]
@@ -91,7 +91,7 @@ def log_of(flown, seed, path):
             messages.append((at_ms, mavlink.MAVLink_named_value_float_message(at_ms, b"NO2", value)))
     vehicle = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     records = [
-        struct.pack(">Q", BEGIN_UNIX_US + 1000 * at_ms) + message.pack(vehicle)
+        struct.pack(">Q", begin_us + 1000 * at_ms) + message.pack(vehicle)
         for at_ms, message in sorted(messages, key=lambda one: one[0])
     ]
     path.write_bytes(b"".join(records))

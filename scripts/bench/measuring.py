@@ -202,9 +202,9 @@ def fields(count):
     return (10.0 + 60.0 * (maps - low) / (high - low)).reshape(count, FINE, FINE)
 
 
-def fly(flight, field, draw, stops=None):
+def fly(flight, field, draw, stops=None, hold_s=HOLD_S):
     """Fly over a field: a first-order sensor at a tenth of a second, read once a second, a tenth of it lost."""
-    east, north = track(line_stops(flight) if stops is None else stops)
+    east, north = track(line_stops(flight) if stops is None else stops, hold_s)
     air = map_coordinates(field, [(1 - north) * FINE - 0.5, east * FINE - 0.5], order=1, mode="nearest")
     shown = air
     if flight.t90_s > 0:
@@ -238,10 +238,10 @@ def line_stops(flight):
     return np.array(stops).T
 
 
-def track(stops):
+def track(stops, hold_s=HOLD_S):
     """Return the way from stop to stop at every `STEP_S` as shares of the box, east and north, with a dwell at each."""
     east, north = stops
-    dwell = round(HOLD_S / STEP_S)
+    dwell = round(hold_s / STEP_S)
     pieces = []
     for i in range(east.size - 1):
         steps = round(math.hypot(east[i + 1] - east[i], north[i + 1] - north[i]) * SIDE_M / SPEED_M_S / STEP_S)

@@ -48,6 +48,7 @@ def make(grid=None, seed=0, **changes):
         "home": (51.5012345678, 25.2712345678, -3.0625), "home_altitude_known": True, "lasso_weight": 3e-4,
         "expected": {"relative_error": 1 / 3}, "plans": {"m.plan": "0" * 64},
         "sensor": load_sensor().model_copy(update={"t90_s": 12.5, "range": (0.0, 500.0)}) if seed % 2 else None,
+        "flown": np.flatnonzero(~phi.any(axis=0))[: seed % 3],
     }  # fmt: skip
     return Sidecar(**{**known, **changes})
 
@@ -66,7 +67,7 @@ def test_what_was_written_is_read(tmp_path, grid, seed):
     again = read_sidecar(write(tmp_path, content))
     assert again.grid == grid
     assert again.kept_out is None
-    for name in ("phi", "stops", "allowed"):
+    for name in ("phi", "stops", "allowed", "flown"):
         written, read = getattr(sidecar, name), getattr(again, name)
         assert read.dtype == written.dtype
         assert np.array_equal(read, written)

@@ -21,14 +21,16 @@ from sparsor.cli.console import (
     reporting,
     warn,
 )
+from sparsor.cli.resuming import Flown, check_asked, check_given, resumed_request
 from sparsor.cli.summary import curve_table, mission_rows, mission_values
 
 if TYPE_CHECKING:
     from sparsor.journeys.planning import PlannedMission
+    from sparsor.journeys.resuming import Before
     from sparsor.mission.specification import MissionSpecification
 
 WHERE, PRIOR, SEARCH, FLIGHT = "Where", "What maps look like", "Search", "Flight"
-SENSOR, OUTPUT = "Sensor", "Output"
+SENSOR, OUTPUT, RESUME = "Sensor", "Output", "Flying on where a flight was cut"
 Box = tuple[float, float, float, float]
 
 
@@ -278,6 +280,26 @@ def plan(
         float | None,
         _option(SENSOR, "Instead: no2 with this time to 90 % of a step, s; 0 answers at once.", "--t90", metavar="S"),
     ] = None,
+    resume: Annotated[
+        list[Path] | None,
+        _option(
+            RESUME,
+            "Log of a flight of --mission: what it measured is kept, and the rest is planned anew within the budget "
+            "left; repeatable.",
+            "--resume",
+            metavar="LOG",
+        ),
+    ] = None,
+    mission: Annotated[
+        Path | None, _option(RESUME, "Folder of the mission that was flown.", "--mission", metavar="DIR")
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        _option(RESUME, "Named value to read, where the log holds several.", "--sensor", metavar="NAME|MSG.FIELD"),
+    ] = None,
+    calibration: Annotated[
+        Path | None, _option(RESUME, "Calibration of its readings.", "--calibration", metavar="FILE.toml")
+    ] = None,
     as_json: Json = False,
     quiet: Annotated[bool, quiet_option("Print only the plan's path, and what speaks against flying it.")] = False,
     verbose: Verbose = False,
@@ -332,7 +354,17 @@ def plan(
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},
     }
-    spec, folder = _request(given, mission_file, output)
+    before: Before | None = None
+    flown = Flown(mission, tuple(resume or ()), sensor, calibration)
+    if flown.is_asked:
+        check_asked(flown, given, mission_file, pareto=pareto)
+        given["name"] = name or (None if output is None else _cleaned(output.resolve().name))
+        with progress_bar(talk) as progress:
+            spec, folder, before = resumed_request(flown, given, output, progress)
+    else:
+        spec, folder = _request(given, mission_file, output)
+        if spec.resume is not None:
+            check_given(given, pareto=pareto)
     from sparsor.core.schedulers import workers_at
     from sparsor.journeys.advice import advice
     from sparsor.journeys.folder import check_folder, write_mission
@@ -343,24 +375,24 @@ def plan(
     curve: tuple[PlannedMission, ...] = ()
     with workers_at(scheduler, workers) as hands, progress_bar(talk) as progress:
         if pareto:
-            mission, curve = plan_with_curve(spec, workers=hands, progress=progress)
+            planned, curve = plan_with_curve(spec, workers=hands, progress=progress)
         else:
-            mission = plan_mission(spec, workers=hands, progress=progress)
-    written = write_mission(mission, folder, beside=curve_files(mission, curve) if curve else None)
-    result = mission_values(mission, folder)
+            planned = plan_mission(spec, before=before, workers=hands, progress=progress)
+    written = write_mission(planned, folder, beside=curve_files(planned, curve) if curve else None)
+    result = mission_values(planned, folder)
     if as_json:
         if curve:
             result["pareto"] = curve_rows(curve)
         print_json(result)
         return
     # What says that a mission cannot fly, or is a slip, is said even to those who asked for quiet.
-    warn(advice(mission) if talk is Talk.QUIET else mission.warnings)
+    warn(advice(planned) if talk is Talk.QUIET else planned.warnings)
     if talk is Talk.QUIET:
-        typer.echo("\n".join(str(written[file]) for file in mission.plan_files))
+        typer.echo("\n".join(str(written[file]) for file in planned.plan_files))
         return
-    print_table(mission_rows(mission, details=talk is Talk.VERBOSE), spec.name)
+    print_table(mission_rows(planned, details=talk is Talk.VERBOSE), spec.name)
     if curve:
-        print_columns(*curve_table(mission, curve))
+        print_columns(*curve_table(planned, curve))
     typer.echo(f"written to {folder}: {', '.join(written)}")
 
 

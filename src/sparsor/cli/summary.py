@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from sparsor.journeys.planning import PlannedMission
+    from sparsor.journeys.resuming import Before
+    from sparsor.mission.specification import MissionSpecification
 
 
 def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
@@ -40,7 +42,20 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "cost": found.cost,
         "incoherence": found.incoherence,
         "seed": spec.search.seed,
+        **({} if mission.before is None else {"resumed": _resumed_values(mission.before, spec)}),
         "warnings": list(mission.warnings),
+    }
+
+
+def _resumed_values(before: Before, spec: MissionSpecification) -> dict[str, object]:
+    return {
+        "mission": before.mission.name,
+        "logs": [str(path) for path in before.logs],
+        "cells_measured": int(before.cells.size),
+        "stops_measured": int(before.stops.size),
+        "path_length_m": before.covered.length_m,
+        "air_time_s": before.air_s,
+        "budget": spec.search.budget,
     }
 
 
@@ -73,7 +88,7 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             "expected error",
             f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
             + (
-                "cells flown over)"
+                ("cells flown over)" if mission.before is None else "cells of all flights together)")
                 if spec.search.planner == "refined"
                 else f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells"
             ),
@@ -84,6 +99,17 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{model.window_m[1] / 1000:.4g} km, {model.atoms} atoms",
         ),
     ]
+    if mission.before is not None:
+        before = mission.before
+        table.insert(
+            0,
+            (
+                "resumes",
+                f"'{before.mission.name}': {before.cells.size} cells measured, {before.covered.length_m / 1000:.2f} of "
+                f"{before.covered.total_m / 1000:.2f} km over the stops flown; budget of this flight: "
+                f"{spec.search.budget}",
+            ),
+        )
     if mission.sensor is not None:
         table.append(("sensor", mission.sensor.words))
     if details and spec.search.planner == "monte-carlo":

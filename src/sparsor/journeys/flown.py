@@ -47,7 +47,7 @@ class FlownMission:
     widening : float
         Factor, 1 or above, on the uncertainty where the model's windows are not of the box's size.
     stops : array of int64 (n,)
-        Planned cells in flight order.
+        Planned cells in flight order; of a resumed mission first those that earlier flights measured.
     altitude_m : float or None
         Height of the stops above home.
     phi : array of bool (M, N) or None
@@ -55,6 +55,10 @@ class FlownMission:
     sensor : SensorProfile or None
         What was said to measure, when the mission was planned.
     warnings : tuple of str
+    earlier : int
+        How many of the stops earlier flights measured, whose logs belong to the map too.
+    home : tuple of float or None
+        Longitude and latitude, degrees.
     """
 
     name: str
@@ -69,6 +73,13 @@ class FlownMission:
     phi: NDArray[np.bool_] | None
     sensor: SensorProfile | None
     warnings: tuple[str, ...]
+    earlier: int = 0
+    home: tuple[float, float] | None = None
+
+    @property
+    def route(self) -> NDArray[np.int64]:
+        """The stops of the mission's own plans, in flight order."""
+        return self.stops[self.earlier :]
 
 
 def mission_of_folder(folder: Path) -> FlownMission:
@@ -91,11 +102,13 @@ def mission_of_folder(folder: Path) -> FlownMission:
         allowed=sidecar.allowed,
         model=sidecar.model,
         widening=widening,
-        stops=stops,
+        stops=np.concatenate((sidecar.flown, stops)),
         altitude_m=sidecar.altitude_m,
         phi=sidecar.phi,
         sensor=sidecar.sensor,
         warnings=warnings,
+        earlier=sidecar.flown.size,
+        home=sidecar.home[:2],
     )
 
 

@@ -121,14 +121,19 @@ def _files_before(folder: Path) -> set[str]:
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
     plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
     passed = [(one.items[index].lon_deg, one.items[index].lat_deg) for one in mission.plans for index in one.passing]
-    flown = mission.sorties
+    flown, before = mission.sorties, mission.before
+    phi = candidate.phi
+    if before is not None:  # the map is made of all flights together
+        measured = np.zeros(phi.shape[1], dtype=np.bool_)
+        measured[before.cells] = True
+        phi = np.eye(phi.shape[1], dtype=np.bool_)[measured | phi.any(axis=0)]
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
         allowed=mission.place.inside,
         kept_out=mission.place.inside & ~mission.place.allowed,
         model=mission.prior.model,
-        phi=candidate.phi,
+        phi=phi,
         stops=candidate.stops if flown is None else candidate.stops[np.concatenate(flown.orders)],
         altitude_m=flight.altitude_m,
         hold_s=max(stop.hold_s for stop in plan.stops),
@@ -146,4 +151,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         plans=hashes,
         sensor=mission.sensor,
         passing=tuple(passed),
+        flown=np.zeros(0, dtype=np.int64) if before is None else before.stops,
     )

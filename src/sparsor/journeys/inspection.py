@@ -139,6 +139,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside"
         f"{_kept_out(sidecar)}.",
         f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {_holds(sidecar)}.",
+        *((f"{sidecar.flown.size} more were measured by the flights that it resumes.",) if sidecar.flown.size else ()),
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
         f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast (|s - s'| / |s - mean(s)|).",
         *(() if sidecar.sensor is None else (f"Sensor: {sidecar.sensor.words}.",)),
@@ -148,6 +149,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         "name": sidecar.name,
         "bbox": list(box.as_tuple()),
         "stops": int(sidecar.stops.size),
+        "stops_flown_before": int(sidecar.flown.size),
         "altitude_m": sidecar.altitude_m,
         "hold_s": sidecar.hold_s,
         "home": list(sidecar.home),

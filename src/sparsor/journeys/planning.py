@@ -18,6 +18,7 @@ from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.keepingout import said_of_shore
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
+from sparsor.journeys.resuming import flown_before
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
 from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan, transits
 from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
+    from sparsor.journeys.refining import Known
+    from sparsor.journeys.resuming import Before
     from sparsor.mission.specification import MissionSpecification
 
 _STRAIGHT = (
@@ -72,6 +75,8 @@ class PlannedMission:
     sorties : Sorties or None
         The flights that the route is cut into, where one is not enough and they were asked for; length, times and
         errors above are of the uncut route.
+    before : Before or None
+        What was flown of the mission that this one resumes; the errors above are of all flights together.
     """
 
     specification: MissionSpecification
@@ -91,6 +96,7 @@ class PlannedMission:
     expected_relative_error_cells: float
     warnings: tuple[str, ...]
     sorties: Sorties | None = None
+    before: Before | None = None
 
     @property
     def usable_s(self) -> float:
@@ -122,13 +128,19 @@ class PlannedMission:
 
 
 def plan_mission(
-    spec: MissionSpecification, *, workers: Workers | int | None = None, progress: Progress = silent
+    spec: MissionSpecification,
+    *,
+    before: Before | None = None,
+    workers: Workers | int | None = None,
+    progress: Progress = silent,
 ) -> PlannedMission:
     """Plan a mission; nothing is written.
 
     Parameters
     ----------
     spec : MissionSpecification
+    before : Before, optional
+        What was flown of the mission that it resumes, where that was read already.
     workers : Workers or int, optional
         Who searches and learns, see `sparsor.core.schedulers.workers_at`; a number is one of threads, one a core by
         default. The answer is the same for any.
@@ -141,7 +153,9 @@ def plan_mission(
     """
     hands = workers_of(workers)
     prepared = prepare(spec, workers=hands, progress=progress)
-    return plan_prepared(spec, prepared, workers=hands, progress=progress)
+    if spec.resume is not None and before is None:
+        before = flown_before(spec.resume, prepared.sensor, progress=progress)
+    return plan_prepared(spec, prepared, before=before, workers=hands, progress=progress)
 
 
 def plan_prepared(
@@ -149,6 +163,7 @@ def plan_prepared(
     prepared: Prepared,
     *,
     begin: Sequence[NDArray[np.int64]] = (),
+    before: Before | None = None,
     workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> PlannedMission:
@@ -160,6 +175,8 @@ def plan_prepared(
     prepared : Prepared
     begin : sequence of arrays of int64
         Routes that the refined search may begin from.
+    before : Before, optional
+        What was flown of the mission that it resumes.
     workers : Workers or int
     progress : Progress
 
@@ -170,9 +187,23 @@ def plan_prepared(
     """
     problem = prepared.problem(spec)
     if spec.search.planner == "refined":
-        found = search_refined(prepared, problem, spec, begin=begin, workers=workers, progress=progress)
-        warnings = (_INTERRUPTED,) if found.interrupted else ()
-        return _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), warnings)
+        known = None if before is None else _from_home(before.known, spec, prepared)
+        begin = begin if before is None else (*begin, before.covered.left)
+
+        def made(known: Known | None) -> PlannedMission:
+            found = search_refined(
+                prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress
+            )
+            said = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
+            planned = _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), said)
+            return replace(planned, before=before)
+
+        mission = made(known)
+        if known is None or known.home is None or mission.flyable:
+            return mission
+        # Ways that are measured are longer ones than the battery may allow.
+        shorter = made(replace(known, home=None))
+        return shorter if shorter.flyable else mission
     candidate, weights = search_algorithm_1(problem, spec, workers=workers, progress=progress)
     expected = expected_errors(problem, candidate, prepared.prior.model.mean)
     return _assemble(spec, prepared, candidate, weights, expected, ())
@@ -240,6 +271,14 @@ def _assemble(
     _check(mission, prepared.wind)
     said = (*warnings, *advice(mission), *said_of_shore(mission), *plan.warnings, *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
+
+
+def _from_home(known: Known, spec: MissionSpecification, prepared: Prepared) -> Known:
+    """Return what is known with the cell of home, over which the sensor comes to what it knows."""
+    if spec.flight.home is None:
+        return known
+    cell = int(prepared.place.grid.cell_at(*spec.flight.home))
+    return replace(known, home=cell) if cell >= 0 else known
 
 
 def _check(mission: PlannedMission, wind: SteadyWind) -> None:

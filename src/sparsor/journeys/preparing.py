@@ -14,9 +14,10 @@ from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
 from sparsor.geodesy.shore import OTHER
+from sparsor.journeys.flown import folder_sidecar
 from sparsor.journeys.keepingout import barred_legs, mission_shore, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
-from sparsor.journeys.modelling import PriorChoice, choose_prior
+from sparsor.journeys.modelling import PriorChoice, choose_prior, size_difference
 from sparsor.mission.specification import PAPER_ROWS
 from sparsor.vehicle import (
     CALM,
@@ -33,6 +34,8 @@ from sparsor.vehicle import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from sparsor.core.workers import Workers
@@ -162,9 +165,12 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
         When something asked for is wrong.
     """
     vehicle = load_vehicle(spec.flight.vehicle)
-    autopilot, sensor = autopilot_named(spec.flight.autopilot), _sensor(spec)
+    autopilot, sensor = autopilot_named(spec.flight.autopilot), sensor_of(spec)
     box, area = _where(spec)
-    prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
+    if spec.resume is None:
+        prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
+    else:
+        prior = _prior_flown(spec, box, spec.resume.mission)
     grid = Grid(box, prior.model.shape)
     place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot), mission_shore(spec, grid))
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
@@ -173,7 +179,20 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     return Prepared(place, prior, _legs(place, vehicle, speed, wind), vehicle, autopilot, sensor, speed, wind)
 
 
-def _sensor(spec: MissionSpecification) -> SensorProfile | None:
+def _prior_flown(spec: MissionSpecification, box: BoundingBox, folder: Path) -> PriorChoice:
+    """Return the model that the mission that is resumed was planned with: its sidecar holds it."""
+    path, sidecar = folder_sidecar(folder)
+    if sidecar.grid.box != box:
+        sides = " ".join(f"{side:g}" for side in sidecar.grid.box.as_tuple())
+        raise MissionError(
+            f"the area is not that of the mission that is resumed: '{path}' was planned over {sides}; leave the area "
+            "as it was, or plan a mission of its own"
+        )
+    widening, _ = size_difference(sidecar.model, box)
+    return PriorChoice(sidecar.model, None, (spec.prior.field, spec.prior.model) == (None, None), widening, ())
+
+
+def sensor_of(spec: MissionSpecification) -> SensorProfile | None:
     """Return the sensor; the refined search plans for the packaged one where nothing is said, Algorithm 1 for none."""
     if spec.sensor is None:
         return load_sensor() if spec.search.planner == "refined" else None

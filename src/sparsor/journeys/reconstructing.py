@@ -20,7 +20,7 @@ from sparsor.journeys.readings import concentrations
 from sparsor.vehicle import load_sensor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from sparsor.design.decoders import Decoded, DecoderName
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from sparsor.flightlog import Samples
     from sparsor.journeys.flown import FlownMission
     from sparsor.journeys.readings import Readings
+    from sparsor.vehicle import SensorProfile
 
 LARGEST_FINER = 16
 MOSTLY = 0.5
@@ -157,25 +158,18 @@ def reconstruct(
         When the logs cannot be read, hold no such sensor, or were not flown here.
     """
     mission = mission or requested_mission(request, progress=progress)
-    log = read_logs(request.logs, sensor=request.sensor, progress=progress)
-    logged = samples(log, sensor=request.sensor, system=request.system)
-    _check_flown_here(logged, mission)
-    readings = concentrations(
-        log,
-        logged,
-        profile=mission.sensor if request.profile is None else load_sensor(request.profile),
+    flight = measured_flight(
+        request.logs,
+        mission,
+        mission.sensor if request.profile is None else load_sensor(request.profile),
+        sensor=request.sensor,
+        system=request.system,
         calibration=request.calibration,
         unit=request.unit,
         t90_s=request.t90_s,
+        progress=progress,
     )
-    measured = measure(
-        logged,
-        mission.grid,
-        readings.profile,
-        value=readings.value,
-        stops=mission.stops,
-        altitude_m=mission.altitude_m,
-    )
+    logged, readings, measured = flight.samples, flight.readings, flight.measured
     progress("decoding", 0, 1)
     decoded = decode(
         measured.measurements,
@@ -200,9 +194,66 @@ def reconstruct(
             *mission.warnings,
             *readings.warnings,
             *measured.warnings,
+            *_earlier_flights(mission, measured),
             *_warnings(request, logged, measured, decoded),
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFlight:
+    """What the logs of a mission say before anything is decoded."""
+
+    samples: Samples
+    readings: Readings
+    measured: Measured
+
+
+def measured_flight(
+    logs: Sequence[Path],
+    mission: FlownMission,
+    profile: SensorProfile | None,
+    *,
+    sensor: str | None = None,
+    system: int | None = None,
+    calibration: Path | None = None,
+    unit: str | None = None,
+    t90_s: float | None = None,
+    whole: bool = True,
+    progress: Progress = silent,
+) -> MeasuredFlight:
+    """Return what the logs of a mission measured.
+
+    Parameters
+    ----------
+    logs : sequence of Path
+    mission : FlownMission
+    profile : SensorProfile or None
+        The sensor that flew, as far as it is known.
+    sensor, system, calibration, unit, t90_s
+        As for `ReconstructRequest`.
+    whole : bool
+        Whether every stop was meant to be flown: then those that were missed are told.
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        When the logs cannot be read, hold no such sensor, or were not flown here.
+    """
+    log = read_logs(logs, sensor=sensor, progress=progress)
+    logged = samples(log, sensor=sensor, system=system)
+    _check_flown_here(logged, mission)
+    readings = concentrations(log, logged, profile=profile, calibration=calibration, unit=unit, t90_s=t90_s)
+    measured = measure(
+        logged,
+        mission.grid,
+        readings.profile,
+        value=readings.value,
+        stops=mission.stops if whole else None,
+        altitude_m=mission.altitude_m,
+    )
+    return MeasuredFlight(logged, readings, measured)
 
 
 def _check_flown_here(logged: Samples, mission: FlownMission) -> None:
@@ -259,6 +310,17 @@ def _flown(logged: Samples, readings: Readings, measured: Measured) -> FlownSamp
         boot=logged.boot,
         unix_s=logged.unix_s,
         reason=measured.reason,
+    )
+
+
+def _earlier_flights(mission: FlownMission, measured: Measured) -> tuple[str, ...]:
+    """Say when stops are missed that flights before a resumed mission measured."""
+    count = int(np.isin(mission.stops[: mission.earlier], measured.missed).sum())
+    if not count:
+        return ()
+    return (
+        f"{count} of the stops missed were measured by the flights that '{mission.name}' resumes: give their logs too, "
+        "for the map of all flights together.",
     )
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from sparsor.core.workers import Workers
     from sparsor.design import Problem
+    from sparsor.design.decoders.noise import Noise
     from sparsor.journeys.preparing import Prepared
     from sparsor.mission.specification import MissionSpecification
     from sparsor.prior.model import Model
@@ -38,6 +39,30 @@ READING_NOISE = 0.05**2
 SPREAD_OVER_NOISE: Final = 13.0 / 5.0
 _SAMPLES = 64  # of Algorithm 1: one start among many
 LINEAR: Final[tuple[DecoderName, ...]] = ("kriging", "mmse", "blend")
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What earlier flights measured, in the unit of maps of a spread of 1.
+
+    Parameters
+    ----------
+    rows : array of float64 (m, N)
+        Weights of the cells in each reading.
+    noise : Noise
+    of_a_reading : float
+        Variance of the noise of one reading of the sensor, as it was found; of those to come too.
+    zero_sd : float
+        How far the sensor's zero will have moved by the next flight.
+    home : int or None
+        Cell from which that one takes off, where that is on the grid.
+    """
+
+    rows: NDArray[np.float64]
+    noise: Noise
+    of_a_reading: float
+    zero_sd: float
+    home: int | None = None
 
 
 @dataclass(frozen=True)
@@ -59,7 +84,15 @@ class Refined:
     interrupted: bool
 
 
-def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_s: float, braking_s: float) -> Task:
+def refined_task(
+    model: Model,
+    problem: Problem,
+    sensor: SensorProfile,
+    *,
+    hold_s: float,
+    braking_s: float,
+    known: Known | None = None,
+) -> Task:
     """Return what the refined search is to solve.
 
     Parameters
@@ -71,16 +104,20 @@ def refined_task(model: Model, problem: Problem, sensor: SensorProfile, *, hold_
         Its response, and its noise relative to the maps, see `SPREAD_OVER_NOISE`.
     hold_s, braking_s : float
         A dwell, and what it takes beside that.
+    known : Known, optional
+        From earlier flights over the same map.
     """
     assert problem.budget is not None
     with one_blas_thread():
         covariance = training_covariance(model, problem.counted)
     # The profile's own noise cancels: the maps are as much larger as the sensor is fit to tell.
-    noise_s = sensor.interval_s / SPREAD_OVER_NOISE**2 if sensor.noise_sd > 0 else 0.0
+    of_a_reading = 1 / SPREAD_OVER_NOISE**2 if known is None else known.of_a_reading
+    noise_s = sensor.interval_s * of_a_reading if sensor.noise_sd > 0 else 0.0
     answer = Sensor(READING_NOISE, noise_s, sensor.t90_s / T90_OVER_TAU)
     # A dwell of a budget of time is told apart from a stop that is flown through.
     budget = replace(problem.budget, per_stop=0.0)
-    return Task(covariance, problem.legs, budget, answer, hold_s, braking_s, problem.mapped)
+    task = Task(covariance, problem.legs, budget, answer, hold_s, braking_s, problem.mapped)
+    return task if known is None else task.after(known.rows, known.noise, known.zero_sd**2, known.home)
 
 
 def search_refined(
@@ -89,6 +126,7 @@ def search_refined(
     spec: MissionSpecification,
     *,
     begin: Sequence[NDArray[np.int64]] = (),
+    known: Known | None = None,
     workers: Workers | int = 1,
     progress: Progress = silent,
 ) -> Refined:
@@ -102,6 +140,8 @@ def search_refined(
     spec : MissionSpecification
     begin : sequence of arrays of int64
         Routes to begin from beside the search's own and Algorithm 1's.
+    known : Known, optional
+        From earlier flights over the same map.
     workers : Workers or int
     progress : Progress
 
@@ -113,7 +153,7 @@ def search_refined(
     legs, model = prepared.legs, prepared.prior.model
     assert prepared.sensor is not None
     hold_s, braking_s = prepared.hold(spec)
-    task = refined_task(model, problem, prepared.sensor, hold_s=hold_s, braking_s=braking_s)
+    task = refined_task(model, problem, prepared.sensor, hold_s=hold_s, braking_s=braking_s, known=known)
     route = refine(
         task,
         seed=spec.search.seed,
@@ -139,7 +179,7 @@ def search_refined(
         theta=0,
         dwells=dwells,
     )
-    error = linear_expectation(model, problem.counted, *task.readings(route.stops), spec.search.seed)
+    error = linear_expectation(model, problem.counted, *task.readings(route.stops), spec.search.seed, known)
     return Refined(candidate, error, route.interrupted)
 
 
@@ -164,7 +204,12 @@ def apart(stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 
 def linear_expectation(
-    model: Model, counted: NDArray[np.bool_], rows: NDArray[np.float64], variance: NDArray[np.float64], seed: int
+    model: Model,
+    counted: NDArray[np.bool_],
+    rows: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    seed: int,
+    known: Known | None = None,
 ) -> float:
     """Return the mean ``|s - s_hat| / |s - mean(s)|`` over the validation maps, by the best linear decoder.
 
@@ -176,6 +221,8 @@ def linear_expectation(
     rows, variance : arrays (m, N), (m,)
         What the flight measures, see `Task.readings`.
     seed : int
+    known : Known, optional
+        From earlier flights over the same map: then of all readings together.
 
     Raises
     ------
@@ -185,7 +232,11 @@ def linear_expectation(
     maps = unit_shapes(model.validation, counted)
     if not len(maps):
         raise DesignError("the validation maps have no contrast inside the area: no error can be expected of them")
-    readings = Measurements(rows, rows @ maps[0], variance)
+    drift = None
+    if known is not None:
+        drift = np.concatenate((known.noise.drift, np.full(len(rows), known.zero_sd)))
+        rows, variance = np.vstack((known.rows, rows)), np.concatenate((known.noise.variance, variance))
+    readings = Measurements(rows, rows @ maps[0], variance, drift)
     setting = Setting(model, readings, counted, np.zeros(len(rows)), seed)
     with one_blas_thread():
         return min(one.error for one in candidates(setting, LINEAR, amplitude=1.0).values())

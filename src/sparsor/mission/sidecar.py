@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,6 +59,8 @@ class Sidecar:
     kept_out : array of bool (N,) or None
         Cells inside the area that are not flown to, since they lie in a keep-out or its margin; None: nothing was
         said of them, in a sidecar of an earlier version.
+    flown : array of int64 (k,)
+        Of a resumed mission: stops that earlier flights measured already, in their flight order.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Sidecar:
     sensor: SensorProfile | None = None
     passing: tuple[tuple[float, float], ...] = ()
     kept_out: NDArray[np.bool_] | None = None
+    flown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -105,6 +108,7 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
             "phi": sidecar.phi,
             "stops": sidecar.stops,
             **({} if sidecar.kept_out is None or not sidecar.kept_out.any() else {"kept_out": sidecar.kept_out}),
+            **({"flown": sidecar.flown} if sidecar.flown.size else {}),
             **model_arrays(sidecar.model),
         }
     )
@@ -146,10 +150,12 @@ def content_hash(content: bytes) -> str:
 def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], model: Model) -> Sidecar:
     grid = Grid(BoundingBox(*(float(side) for side in about["bbox"])), (about["shape"][0], about["shape"][1]))
     phi, stops, allowed = arrays["phi"], arrays["stops"].astype(np.int64), arrays["allowed"]
+    flown = arrays.get("flown", np.zeros(0, dtype=np.int64)).astype(np.int64)
     fits = phi.ndim == 2 and phi.shape[1] == allowed.size == grid.size
     kept_out = arrays.get("kept_out")
     fits = fits and (kept_out is None or kept_out.size == grid.size)
-    if not fits or stops.min(initial=0) < 0 or stops.max(initial=0) >= grid.size:
+    every = np.concatenate((stops, flown))
+    if not fits or every.min(initial=0) < 0 or every.max(initial=0) >= grid.size:
         raise ValueError(f"its arrays do not fit a grid of {grid.shape[0]} x {grid.shape[1]}")
     return Sidecar(
         name=str(about["name"]),
@@ -168,4 +174,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
         kept_out=None if kept_out is None else kept_out.astype(np.bool_),
+        flown=flown,
     )

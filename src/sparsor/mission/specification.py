@@ -224,6 +224,15 @@ class OutputSection(_Section):
     export: tuple[Export, ...] = ()
 
 
+class ResumeSection(_Section):
+    """What was flown before: the mission's folder, its flights' logs, and which of their values to read."""
+
+    mission: Path
+    logs: Annotated[tuple[Path, ...], Field(min_length=1)]
+    sensor: str | None = None
+    calibration: Path | None = None
+
+
 class MissionSpecification(_Section):
     """A mission as it was asked for."""
 
@@ -235,6 +244,7 @@ class MissionSpecification(_Section):
     coast: CoastSection | None = None
     sensor: SensorSection | None = None
     output: OutputSection = OutputSection()
+    resume: ResumeSection | None = None
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -243,7 +253,15 @@ class MissionSpecification(_Section):
         profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
         coast = None if self.coast is None else self.coast.file
         paths = (self.area.file, coast, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
-        return tuple(path for path in paths if path is not None)
+        before = self.resume
+        flown = () if before is None else (before.mission / "mission.toml", *before.logs, before.calibration)
+        return tuple(path for path in (*paths, *flown) if path is not None)
+
+    @model_validator(mode="after")
+    def _resumed_by_the_refined_search(self) -> Self:
+        if self.resume is not None and self.search.planner != "refined":
+            raise ValueError("what is left of a mission is planned by the refined search: leave the planner out")
+        return self
 
     @field_validator("name")
     @classmethod
@@ -370,6 +388,10 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     sensor = spec.sensor
     if sensor is not None and sensor.profile is not None and sensor.profile.endswith(".toml"):
         sensor = sensor.model_copy(update={"profile": change(Path(sensor.profile)).as_posix()})
+    resume = spec.resume
+    if resume is not None:
+        logs = tuple(change(path) for path in resume.logs)
+        resume = moved(resume, "mission", "calibration").model_copy(update={"logs": logs})
     return spec.model_copy(
         update={
             "area": moved(spec.area, "file"),
@@ -377,6 +399,7 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
             "prior": moved(spec.prior, "field", "model"),
             "flight": flight,
             "sensor": sensor,
+            "resume": resume,
         }
     )
 

@@ -27,6 +27,10 @@ class Flyover(NamedTuple):
         Time of flight of each leg.
     hold_s : float
         Dwell at a stop that follows itself; 0 where routes have none.
+    home : int
+        Cell of home.
+    by_way : array of bool (N,)
+        Stops whose way from or to home counts as flown over.
     """
 
     columns: int
@@ -35,12 +39,20 @@ class Flyover(NamedTuple):
     columns_off: NDArray[np.int64]
     share: NDArray[np.float64]
     seconds: NDArray[np.float64]
-    hold_s: float = 0.0
+    hold_s: float
+    home: int
+    by_way: NDArray[np.bool_]
 
 
-def flyover(legs: LegTable, *, hold_s: float = 0.0) -> Flyover:
-    """Return the cells under the legs of a table, for one dwell of `hold_s`."""
-    return Flyover(legs.shape[1], *crossing_table(legs.shape), np.ascontiguousarray(legs.seconds), float(hold_s))
+def flyover(legs: LegTable, *, hold_s: float = 0.0, home: int | None = None) -> Flyover:
+    """Return the cells under the legs of a table, for one dwell of `hold_s`.
+
+    With the cell of home the straight ways from it to the first stop and back from the last count too; a way that is
+    barred leads round what bars it, and does not.
+    """
+    by_way = np.zeros(legs.size, dtype=np.bool_) if home is None else legs.length[home] <= legs.longest
+    seconds = np.ascontiguousarray(legs.seconds)
+    return Flyover(legs.shape[1], *crossing_table(legs.shape), seconds, float(hold_s), home or 0, by_way)
 
 
 @njit(cache=True, nogil=True)
@@ -49,6 +61,7 @@ def passes(over: Flyover, stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], 
 
     A stop that is given twice in a row is dwelt at.
     """
+    stops = _with_ways(over, stops)
     count = 1
     for k in range(stops.size - 1):
         offset = _offset(over, stops[k], stops[k + 1])
@@ -72,6 +85,18 @@ def passes(over: Flyover, stops: NDArray[np.int64]) -> tuple[NDArray[np.int64], 
                 cell[last] = under
             seconds[last] += over.share[i] * time
     return cell[: last + 1], seconds[: last + 1]
+
+
+@njit(cache=True, nogil=True)
+def _with_ways(over: Flyover, stops: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a route with home before and behind it, where those ways count."""
+    before = int(over.by_way[stops[0]] and stops[0] != over.home)
+    behind = int(over.by_way[stops[-1]] and stops[-1] != over.home)
+    if before + behind == 0:
+        return stops
+    way = np.full(stops.size + before + behind, over.home, dtype=np.int64)
+    way[before : before + stops.size] = stops
+    return way
 
 
 @njit(cache=True, nogil=True)

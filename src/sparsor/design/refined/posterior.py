@@ -15,7 +15,7 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from sparsor.design.refined.dense import inner_products, inverse_root, solve
 
-_LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
+LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown
 _LEAST_NOISE = 1e-6  # of the map's variance
 
 
@@ -25,11 +25,12 @@ class Belief(NamedTuple):
     Parameters
     ----------
     factor : array of float64 (N, r + 1)
-        Components of the covariance, and a last column of ones for the level; 0 outside the area.
+        Components of the covariance, then a column of ones for the level, and one for the sensor's zero, where they
+        are unknown; 0 outside the area.
     spread : array of float64 (r + 1,)
         Variance of each coefficient.
     size : array of float64 (r + 1,)
-        Mean square of each column over the cells that count.
+        Mean square of each column over the cells that count; 0 for the sensor's zero, which is no part of the map.
     residual : array of float64 (N,)
         Variance of a cell around what the factor says.
     allowed : array of bool (N,)
@@ -50,6 +51,8 @@ def belief(
     mapped: NDArray[np.bool_] | None = None,
     rank: int = 96,
     least: float = 0.0,
+    level_variance: float = LEVEL_VARIANCE,
+    zero_variance: float = 0.0,
 ) -> Belief:
     """Return the leading components of a covariance as the search needs them.
 
@@ -65,21 +68,31 @@ def belief(
         Most components.
     least : float
         Components of less variance, over all cells together, are left out.
+    level_variance : float
+        Of the level, which the covariance says nothing of; 0 where it does: then there is no column for it.
+    zero_variance : float
+        Of what the sensor shows too much, the same in all readings of a flight; 0 where its zero is that of the map's
+        level.
     """
     cells = np.flatnonzero(allowed if mapped is None else mapped)
     values, vectors = np.linalg.eigh(covariance[np.ix_(cells, cells)])
     leading = values.argsort()[::-1][:rank]
-    leading = leading[values[leading] > max(_LEAST_NOISE * values.max(), least)]
+    telling = values[leading] > max(_LEAST_NOISE * values.max(), least)
+    telling[0] |= level_variance == 0  # something has to be left to tell
+    leading = leading[telling]
     # The signs that LAPACK gives are its own; they do not change any result.
-    inside = vectors[:, leading] * np.sqrt(values[leading])
+    inside = vectors[:, leading] * np.sqrt(np.maximum(values[leading], 0.0))
     left = np.maximum(covariance.diagonal()[cells] - np.square(inside).sum(axis=1), 0.0)
-    factor = np.zeros((allowed.size, leading.size + 1))
-    factor[cells, :-1] = inside
-    factor[cells, -1] = 1.0
+    shared = np.array([level_variance, zero_variance])
+    factor = np.zeros((allowed.size, leading.size + np.count_nonzero(shared)))
+    factor[cells, : leading.size] = inside
+    factor[cells, leading.size :] = 1.0
     residual = np.zeros(allowed.size)
     residual[cells] = left + _LEAST_NOISE
-    spread = np.append(np.ones(leading.size), _LEVEL_VARIANCE)
-    return Belief(factor, spread, np.square(factor).sum(axis=0) / cells.size, residual, allowed)
+    spread = np.append(np.ones(leading.size), shared[shared > 0])
+    size = np.square(factor).sum(axis=0) / cells.size
+    size[size.size - int(zero_variance > 0) :] = 0.0
+    return Belief(factor, spread, size, residual, allowed)
 
 
 @njit(cache=True, nogil=True)

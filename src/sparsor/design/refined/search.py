@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event, Lock
 from typing import TYPE_CHECKING
 
@@ -19,10 +19,11 @@ from sparsor.core.progress import Progress, silent
 from sparsor.core.streams import stream
 from sparsor.core.workers import Workers, one_blas_thread, workers_of
 from sparsor.design.refined.annealing import anneal, route_error
+from sparsor.design.refined.conditioning import conditioned
 from sparsor.design.refined.costs import costs, shortest_pair, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.flyover import flyover, passes
-from sparsor.design.refined.posterior import belief
+from sparsor.design.refined.posterior import LEVEL_VARIANCE, belief
 from sparsor.design.refined.readings import Sensor, weights
 from sparsor.design.refined.starts import starts
 from sparsor.errors import BudgetError, DesignError
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sparsor.design.budget import Budget
+    from sparsor.design.decoders.noise import Noise
     from sparsor.design.legs import LegTable
     from sparsor.design.refined.costs import Costs
     from sparsor.design.refined.flyover import Flyover
@@ -81,6 +83,12 @@ class Task:
         What a dwell takes beside that.
     mapped : array of bool (N,), optional
         Cells that the error counts, those among them that may not be flown too; default: those that may be flown.
+    level_variance : float
+        Of the maps' level, which is as good as unknown; 0 where the covariance holds what is known of it, see `after`.
+    zero_variance : float
+        Of what the sensor shows too much all through the flight.
+    home : int, optional
+        Cell of home, where what is flown over on the ways from and to it counts as measured.
     """
 
     covariance: NDArray[np.float64]
@@ -90,12 +98,17 @@ class Task:
     hold_s: float = 0.0
     braking_s: float = 0.0
     mapped: NDArray[np.bool_] | None = None
+    level_variance: float = LEVEL_VARIANCE
+    zero_variance: float = 0.0
+    home: int | None = None
 
     def __post_init__(self) -> None:
         size = self.legs.size
         if self.covariance.shape != (size, size):
             raise DesignError(f"a covariance of shape {self.covariance.shape} does not fit a grid of {size} cells")
-        for name, value in {**self.sensor._asdict(), "hold_s": self.hold_s, "braking_s": self.braking_s}.items():
+        given = {"hold_s": self.hold_s, "braking_s": self.braking_s}
+        unknown = {"level_variance": self.level_variance, "zero_variance": self.zero_variance}
+        for name, value in {**self.sensor._asdict(), **given, **unknown}.items():
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"{name} is {value:g}; it has to be 0 or above")
 
@@ -110,6 +123,11 @@ class Task:
         return self.sensor.noise + self.sensor.noise_s / self.legs.step(self.legs.seconds)
 
     @property
+    def over(self) -> Flyover:
+        """What is under its routes."""
+        return flyover(self.legs, hold_s=self.hold_s, home=self.home)
+
+    @property
     def least_telling(self) -> float:
         """Variance of a component of the maps, over all cells together, that the longest flight hardly tells of."""
         table = self.legs.length if self.budget.measure == "distance" else self.legs.seconds
@@ -118,7 +136,26 @@ class Task:
 
     def readings(self, stops: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what a route's flight measures: rows of weights over the cells (n, N), and variances (n,)."""
-        return weights(self.sensor, *passes(flyover(self.legs, hold_s=self.hold_s), stops), self.legs.size)
+        return weights(self.sensor, *passes(self.over, stops), self.legs.size)
+
+    def after(
+        self, rows: NDArray[np.float64], noise: Noise, zero_variance: float = 0.0, home: int | None = None
+    ) -> Task:
+        """Return the task of a further flight over maps that were measured before.
+
+        Parameters
+        ----------
+        rows : array of float64 (m, N)
+            Weights of the cells in each reading.
+        noise : Noise
+            Of the readings, for maps of a mean variance of 1.
+        zero_variance : float
+            Of how far the sensor's zero moves until the further flight.
+        home : int, optional
+            Cell from which that one takes off: its way over cells that are known tells the sensor's zero.
+        """
+        covariance = conditioned(self.covariance, self.level_variance, rows, noise)
+        return replace(self, covariance=covariance, level_variance=0.0, zero_variance=zero_variance, home=home)
 
 
 @dataclass(frozen=True)
@@ -207,11 +244,13 @@ class _Search:
     ) -> None:
         allowed = task.legs.allowed
         self.task, self.seed, self.moves, self.progress = task, seed, iterations, progress
-        self.over_cells = flyover(task.legs, hold_s=task.hold_s)
+        self.over_cells = task.over
         self.costs = costs(task.budget, task.legs, task.hold_s + task.braking_s if task.hold_s else 0.0)
         least = task.least_telling
+        shared = {"level_variance": task.level_variance, "zero_variance": task.zero_variance}
         self.beliefs = [
-            belief(task.covariance, allowed, mapped=task.counted, rank=one.rank, least=least) for one in _STAGES
+            belief(task.covariance, allowed, mapped=task.counted, rank=one.rank, least=least, **shared)
+            for one in _STAGES
         ]
         self.hands = workers_of(workers)
         self.shared = [self.hands.share((one, self.over_cells, task.sensor, self.costs)) for one in self.beliefs]
