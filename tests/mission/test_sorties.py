@@ -36,7 +36,7 @@ def costs(draw: st.DrawFn, most: int = 12) -> SortieCosts:
 @settings(max_examples=60, deadline=None)
 @given(costs())
 def test_every_stop_is_flown_once_within_the_limit(given_costs: SortieCosts) -> None:
-    count = len(given_costs.out_s)
+    count = given_costs.count
     assert not given_costs.beyond_reach.size
     found = best_sorties(given_costs, iterations=60)
     assert sorted(itertools.chain(*found)) == list(range(count))
@@ -52,7 +52,7 @@ def test_every_stop_is_flown_once_within_the_limit(given_costs: SortieCosts) -> 
 @settings(max_examples=60, deadline=None)
 @given(costs(most=8))
 def test_no_cut_of_the_route_uses_less(given_costs: SortieCosts) -> None:
-    count = len(given_costs.out_s)
+    count = given_costs.count
     best = min(
         given_costs.total_s(parts)
         for cuts in itertools.product([False, True], repeat=count - 1)

@@ -104,7 +104,7 @@ def test_everything_left_out_is_filled_in():
     }  # fmt: skip
     assert filled["flight"] == {
         "vehicle": "quad", "autopilot": "ardupilot", "altitude_m": 50.0, "hold_s": 5.0, "fence_margin_m": 50.0,
-        "sorties": False, "keep_out": (), "keep_out_margin_m": 30.0,
+        "sorties": True, "keep_out": (), "keep_out_margin_m": 30.0, "homes": (), "drop_unreachable": False,
     }  # fmt: skip
     assert spec(search={"seed": None}) == spec()
 

@@ -21,6 +21,7 @@ from sparsor.cli.console import (
     reporting,
     warn,
 )
+from sparsor.cli.places import homes_given
 from sparsor.cli.summary import curve_table, mission_rows, mission_values
 
 if TYPE_CHECKING:
@@ -216,8 +217,13 @@ def plan(
         ),
     ] = None,
     home: Annotated[
-        tuple[float, float] | None,
-        _option(FLIGHT, "Take-off and landing place (default: the first stop).", "--home", metavar="LON LAT"),
+        list[str] | None,
+        _option(
+            FLIGHT,
+            "Take-off and landing place (default: the first stop); repeatable: each flight has the best of them.",
+            "--home",
+            metavar="LON LAT",
+        ),
     ] = None,
     home_altitude: Annotated[
         float | None,
@@ -228,12 +234,18 @@ def plan(
         _option(FLIGHT, "Wind to plan for: m/s, and where it comes from.", "--wind", metavar="SPEED FROM_DEG"),
     ] = None,
     sorties: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--sorties",
-            help="Cut a route beyond one battery into flights from home and back, NAME-1.plan, NAME-2.plan ...",
+            "--sorties/--no-sorties",
+            help="Whether a route beyond one battery is cut into flights from home and back, NAME-1.plan, NAME-2.plan "
+            "... (default), or stays one planning study.",
             rich_help_panel=FLIGHT,
+            show_default=False,
         ),
+    ] = None,
+    drop_unreachable: Annotated[
+        bool,
+        typer.Option("--drop-unreachable", help="Leave out stops beyond reach of one battery.", rich_help_panel=FLIGHT),
     ] = False,
     keep_out: Annotated[
         list[Path] | None,
@@ -305,10 +317,11 @@ def plan(
             "altitude_m": altitude,
             "speed_m_s": speed,
             "hold_s": hold,
-            "home": home,
+            **homes_given(home),
             "home_altitude_m": home_altitude,
             "wind": wind,
-            "sorties": sorties or None,
+            "sorties": sorties,
+            "drop_unreachable": drop_unreachable or None,
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
         },
@@ -380,6 +393,7 @@ def _request(
 def _as_typed(message: str) -> str:
     """Return a message about keys of mission.toml as one about the options that were typed for them."""
     message = message.replace("search.time_s", "--time").replace("prior.time", "--field-time")
+    message = re.sub(r"\bflight\.homes\b(?:\.\d+)?", "flight.home", message)
     message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)

@@ -6,8 +6,6 @@ import re
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sparsor.core.files import write_files
 from sparsor.errors import MissionError
 from sparsor.mission import export_bytes, plan_bytes
@@ -119,18 +117,17 @@ def _files_before(folder: Path) -> set[str]:
 
 
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
-    plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
+    plan, candidate, flight = mission.plans[0], mission.measured, mission.specification.flight
     passed = [(one.items[index].lon_deg, one.items[index].lat_deg) for one in mission.plans for index in one.passing]
-    flown = mission.sorties
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
         allowed=mission.place.allowed,
         model=mission.prior.model,
         phi=candidate.phi,
-        stops=candidate.stops if flown is None else candidate.stops[np.concatenate(flown.orders)],
+        stops=candidate.stops,
         altitude_m=flight.altitude_m,
-        hold_s=max(stop.hold_s for stop in plan.stops),
+        hold_s=max(stop.hold_s for one in mission.plans for stop in one.stops),
         home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
         home_altitude_known=plan.home.altitude_known,
         lasso_weight=mission.specification.search.lasso or mission.prior.model.lasso_weight,

@@ -43,12 +43,12 @@ def mission_zones(spec: MissionSpecification, grid: Grid, vehicle: Vehicle, auto
         most_points=autopilot.on_board(vehicle).max_fence_points - MAX_CORNERS,
         longest_leg_m=float(np.hypot(box.east_m, box.north_m)),
     )
-    home = spec.flight.home
-    if home is not None and bool(zones.holds(*home)):
-        raise MissionError(
-            f"home, {home[0]:g} {home[1]:g}, lies in a keep-out ({', '.join(zones.names)}) or within its margin of "
-            f"{spec.flight.keep_out_margin_m:g} m: take off elsewhere (--home LON LAT)"
-        )
+    for home in spec.flight.given_homes:
+        if bool(zones.holds(*home)):
+            raise MissionError(
+                f"home, {home[0]:g} {home[1]:g}, lies in a keep-out ({', '.join(zones.names)}) or within its margin of "
+                f"{spec.flight.keep_out_margin_m:g} m: take off elsewhere (--home LON LAT)"
+            )
     return zones
 
 
