@@ -125,9 +125,8 @@ def test_what_is_left_out_needs_sorties(console):
     assert "leave out --no-sorties" in ran.err
 
 
-@pytest.mark.parametrize("t90", [0, 30])
-def test_the_error_is_that_of_what_the_sorties_fly(console, tmp_path, t90):
-    words = ("--name", "m", "--budget", "30km", "--t90", t90, "--json", *HOME)
+def test_the_error_is_that_of_what_the_sorties_fly(console, tmp_path):
+    words = ("--name", "m", "--budget", "20km", "--json", *HOME)
     whole = console.mission(*words, "--no-sorties", iterations=100)
     ran = console.mission(*words, "--force", iterations=100)
     sidecar, result = read_sidecar(tmp_path / "missions/m/m.npz"), ran.result
@@ -140,13 +139,10 @@ def test_the_error_is_that_of_what_the_sorties_fly(console, tmp_path, t90):
     assert result["cells_flown_over"] == result["cells_measured"] == len(under)
     assert result["expected_relative_error"] != whole.result["expected_relative_error"]
     assert sidecar.expected["relative_error"] == result["expected_relative_error"]
-    if t90 == 0:
-        # A sensor that answers at once: what a flight measures depends on the cells and the seconds in them alone.
-        assert result["expected_relative_error"] == pytest.approx(whole.result["expected_relative_error"], abs=0.1)
 
 
 def test_the_paper_s_sums_do_not_depend_on_the_order(console):
-    words = ("--name", "m", "--planner", "monte-carlo", "--budget", "30km", "--json", *HOME)
+    words = ("--name", "m", "--planner", "monte-carlo", "--budget", "20km", "--json", *HOME)
     whole = console.mission(*words, "--no-sorties")
     ran = console.mission(*words, "--force")
     assert ran.result["sorties"] > 1

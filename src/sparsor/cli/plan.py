@@ -247,6 +247,13 @@ def plan(
         bool,
         typer.Option("--drop-unreachable", help="Leave out stops beyond reach of one battery.", rich_help_panel=FLIGHT),
     ] = False,
+    vehicles: Annotated[
+        int | None, _option(FLIGHT, "Fly with this many at once, 1..8, each on a part of the route.", "--vehicles")
+    ] = None,
+    separation: Annotated[
+        float | None,
+        _option(FLIGHT, "Least distance between vehicles at once, m (default: 10).", "--separation", metavar="M"),
+    ] = None,
     keep_out: Annotated[
         list[Path] | None,
         _option(
@@ -322,6 +329,8 @@ def plan(
             "wind": wind,
             "sorties": sorties,
             "drop_unreachable": drop_unreachable or None,
+            "vehicles": vehicles,
+            "separation_m": separation,
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
         },

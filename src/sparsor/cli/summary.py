@@ -30,6 +30,8 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "flyable": mission.flyable,
         "sorties": len(mission.plans),
         "stops_dropped": int(mission.sorties.dropped.size) if mission.sorties else 0,
+        "vehicles": spec.flight.vehicles,
+        "vehicles_apart_m": mission.sorties.apart_m if mission.sorties else None,
         "sortie_times_s": [time.seconds for time in mission.sorties.times] if mission.sorties else [],
         "expected_relative_error": mission.expected_relative_error,
         "expected_relative_error_cells": mission.expected_relative_error_cells,
@@ -117,8 +119,9 @@ def _flyable(mission: PlannedMission) -> str:
         return "yes, by endurance"
     if len(mission.plans) == 1:
         return f"yes, by endurance, in another order: {mission.sorties.times[0].seconds / 60:.1f} min"
+    kind = "sorties" if mission.sorties.apart_m is None else "flights at once"
     return (
-        f"in {len(mission.plans)} sorties: "
+        f"in {len(mission.plans)} {kind}: "
         + ", ".join(f"{one.seconds / 60:.1f}" for one in mission.sorties.times)
         + " min"
     )

@@ -54,6 +54,17 @@ def _cut_into(mission: PlannedMission) -> str:
     cut = mission.sorties
     assert cut is not None
     usable_min = mission.usable_s / 60
+    if cut.apart_m is not None:
+        heights = ", ".join(f"{height_m:g}" for height_m in cut.heights_m)
+        up = f", at {heights} m (ceiling {mission.vehicle.ceiling_m:g} m)" if mission.vehicle.flies else ""
+        level = ", if the homes lie level" if up else ""
+        places = "; ".join(f"{plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}" for plan in cut.plans)
+        return (
+            f"{len(cut.plans)} vehicles at once, none above {max(time.used_s for time in cut.times) / 60:.1f} of "
+            f"{usable_min:.1f} min{up}, each from a home of its own (see whether it can be used): {places}. Their "
+            f"planned paths are never nearer than {_tenth_down(cut.apart_m)} m, whenever each starts{level}; what they "
+            "drift off their paths comes off that."
+        )
     if len(cut.plans) > 1:
         return (
             f"One battery is not enough for the route: it is cut into {len(cut.plans)} sorties, "
@@ -61,9 +72,15 @@ def _cut_into(mission: PlannedMission) -> str:
             f"{max(time.used_s for time in cut.times) / 60:.1f} of {usable_min:.1f} min."
         )
     used = f"{cut.times[0].used_s / 60:.1f} of {usable_min:.1f} min"
+    if mission.specification.flight.vehicles > 1:
+        return f"One vehicle flies it all: {used}."
     if cut.dropped.size:
         return f"The others are one flight of {used}."
     return f"The route as it was found takes more than one battery; its stops in another order take {used}."
+
+
+def _tenth_down(metres: float) -> str:
+    return f"{floor(metres * 10 + 1e-3) / 10:.1f}"
 
 
 def _what_would_fly(mission: PlannedMission) -> str:

@@ -55,6 +55,8 @@ class FlownMission:
     sensor : SensorProfile or None
         What was said to measure, when the mission was planned.
     warnings : tuple of str
+    heights_m : tuple of float
+        Of vehicles at once, each its own.
     """
 
     name: str
@@ -69,6 +71,7 @@ class FlownMission:
     phi: NDArray[np.bool_] | None
     sensor: SensorProfile | None
     warnings: tuple[str, ...]
+    heights_m: tuple[float, ...] = ()
 
 
 def mission_of_folder(folder: Path) -> FlownMission:
@@ -96,6 +99,7 @@ def mission_of_folder(folder: Path) -> FlownMission:
         phi=sidecar.phi,
         sensor=sidecar.sensor,
         warnings=warnings,
+        heights_m=sidecar.heights_m,
     )
 
 

@@ -61,7 +61,9 @@ def flown_refined(prepared: Prepared, problem: Problem, spec: MissionSpecificati
         assert prepared.sensor is not None
         hold_s, braking_s = prepared.hold(spec)
         task = refined_task(prepared.prior.model, problem, prepared.sensor, hold_s=hold_s, braking_s=braking_s)
-        rows, variances = zip(*(task.readings(tour) for tour in tours), strict=True)
+        # One stop that is flown through is over in no time: a reading that says nothing, and upsets the decoders.
+        longer = [tour for tour in tours if tour.size > 1] or tours
+        rows, variances = zip(*(task.readings(tour) for tour in longer), strict=True)
         model, legs = prepared.prior.model, prepared.legs
         error = linear_expectation(model, legs, np.concatenate(rows), np.concatenate(variances), spec.search.seed)
         return error, error

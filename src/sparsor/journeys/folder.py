@@ -142,4 +142,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         plans=hashes,
         sensor=mission.sensor,
         passing=tuple(passed),
+        heights_m=() if mission.sorties is None else mission.sorties.heights_m,
     )

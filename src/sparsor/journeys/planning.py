@@ -15,6 +15,7 @@ from sparsor.errors import MissionError
 from sparsor.geodesy.lengths import path_length_m
 from sparsor.journeys.advice import advice, said_of
 from sparsor.journeys.algorithm1 import search_algorithm_1
+from sparsor.journeys.fleet import FAILSAFE, cut_for_vehicles
 from sparsor.journeys.flights import whole_flight
 from sparsor.journeys.flownerror import Expected, flown_by_algorithm_1, flown_candidate, flown_refined
 from sparsor.journeys.preparing import Place, Prepared, prepare
@@ -229,13 +230,17 @@ def _assemble(
         warnings=(),
     )
     beyond: tuple[str, ...] = ()
-    if spec.flight.sorties and not mission.flyable:
-        cut = cut_into_sorties(flights)
+    if spec.flight.vehicles > 1 or (spec.flight.sorties and not mission.flyable):
+        cut = cut_for_vehicles(flights) if spec.flight.vehicles > 1 else cut_into_sorties(flights)
         if isinstance(cut, str):
             beyond = (cut,)
         else:
             whole, mission = mission, _flown(mission, flights, cut, after)
-            warnings = (*warnings, said_of(mission, whole))
+            warnings = (
+                *warnings,
+                said_of(mission, whole),
+                *([FAILSAFE] if cut.apart_m is not None and vehicle.flies else []),
+            )
     _check(mission, prepared.wind)
     said = (*warnings, *advice(mission), *beyond, *_of_the_plans(mission), *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))

@@ -175,6 +175,7 @@ def reconstruct(
         value=readings.value,
         stops=mission.stops,
         altitude_m=mission.altitude_m,
+        heights_m=mission.heights_m,
     )
     progress("decoding", 0, 1)
     decoded = decode(

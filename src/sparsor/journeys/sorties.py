@@ -36,12 +36,18 @@ class Sorties:
         Places on the route of each flight's stops, in flight order.
     dropped : array of int64
         Places on the route of the stops that no flight visits, beyond reach of them all.
+    apart_m : float or None
+        Of flights at once: two are never nearer, whenever each of them starts.
+    heights_m : tuple of float
+        Of flights at once, above home.
     """
 
     plans: tuple[MissionPlan, ...]
     times: tuple[FlightTime, ...]
     orders: tuple[NDArray[np.int64], ...]
     dropped: NDArray[np.int64]
+    apart_m: float | None = None
+    heights_m: tuple[float, ...] = ()
 
 
 def cut_into_sorties(flights: Flights) -> Sorties | str:

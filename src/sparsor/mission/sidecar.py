@@ -56,6 +56,8 @@ class Sidecar:
         What will measure, when that was said.
     passing : tuple of (longitude, latitude)
         Waypoints that only lead past a keep-out and are no stops.
+    heights_m : tuple of float
+        Above home, of vehicles at once that fly each at their own; `altitude_m` is the lowest of them.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Sidecar:
     plans: Mapping[str, str]
     sensor: SensorProfile | None = None
     passing: tuple[tuple[float, float], ...] = ()
+    heights_m: tuple[float, ...] = ()
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -92,6 +95,8 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
     }
     if sidecar.passing:
         about["passing"] = [list(place) for place in sidecar.passing]
+    if sidecar.heights_m:
+        about["heights_m"] = list(sidecar.heights_m)
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
@@ -160,4 +165,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         plans={str(key): str(value) for key, value in about["plans"].items()},
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
+        heights_m=tuple(float(height_m) for height_m in about.get("heights_m", ())),
     )

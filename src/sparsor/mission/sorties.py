@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -120,7 +121,22 @@ def cut_route(costs: SortieCosts) -> list[list[int]]:
 
 
 def routed(costs: SortieCosts, *, seed: int, iterations: int, sorties: int) -> list[list[int]] | None:
-    """Return PyVRP's flights over the same stops, None where it finds none that fit."""
+    """Return PyVRP's flights over the same stops, None where it finds none that fit.
+
+    Parameters
+    ----------
+    costs : SortieCosts
+    seed, iterations : int
+        It ends by a count.
+    sorties : int
+        The most that are flown from one home.
+    """
+    found = routes(costs, seed=seed, iterations=iterations, sorties=sorties)
+    return None if found is None else [flight for _, flight in found]
+
+
+def routes(costs: SortieCosts, *, seed: int, iterations: int, sorties: int) -> list[tuple[int, list[int]]] | None:
+    """Return PyVRP's flights with the home of each; parameters as `routed`."""
     from pyvrp import Model
     from pyvrp.stop import MaxIterations
 
@@ -144,13 +160,18 @@ def routed(costs: SortieCosts, *, seed: int, iterations: int, sorties: int) -> l
         for other in range(count):
             if other != one and np.isfinite(costs.leg_s[one, other]):
                 model.add_edge(places[one], places[other], distance=_up(costs.leg_s[one, other] + costs.stop_s[other]))
-    found = model.solve(MaxIterations(iterations), seed=seed, display=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that there may be no flights that fit is an answer too
+        found = model.solve(MaxIterations(iterations), seed=seed, display=False)
     if not found.is_feasible():
         return None
-    flights = [[int(visit.idx) for visit in route if visit.is_client()] for route in found.best.routes()]
-    fits = all(costs.used_s(flight) <= costs.limit_s for flight in flights)
+    flights = [
+        (int(route.vehicle_type()), [int(visit.idx) for visit in route if visit.is_client()])
+        for route in found.best.routes()
+    ]
+    fits = all(costs.used_s(flight, home) <= costs.limit_s for home, flight in flights)
     # By their first stop on the route, so that the same flights come in the same order.
-    return sorted(flights, key=min) if fits else None
+    return sorted(flights, key=lambda flight: min(flight[1])) if fits else None
 
 
 def _up(seconds: float) -> int:

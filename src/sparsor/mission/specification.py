@@ -175,6 +175,8 @@ class FlightSection(_Section):
     keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
     homes: tuple[tuple[Longitude, Latitude], ...] = ()
     drop_unreachable: bool = False
+    vehicles: Annotated[int, Field(ge=1, le=8)] = 1
+    separation_m: Annotated[FiniteFloat, Field(ge=1, le=1000)] = 10.0
 
     @field_validator("wind")
     @classmethod
@@ -195,6 +197,13 @@ class FlightSection(_Section):
     def _cut_where_that_is_needed(self) -> Self:
         if self.drop_unreachable and not self.sorties:
             raise ValueError("--drop-unreachable goes with sorties: leave out --no-sorties (sorties = false)")
+        if self.vehicles > 1 and not self.sorties:
+            raise ValueError("--vehicles goes with sorties: leave out --no-sorties (sorties = false)")
+        if self.vehicles > 1 and len(self.given_homes) not in (0, 1, self.vehicles):
+            raise ValueError(
+                f"{self.vehicles} vehicles and {len(self.given_homes)} homes: give one home, beside which places are "
+                "looked for, or one for each vehicle"
+            )
         return self
 
     @property
