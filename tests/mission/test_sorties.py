@@ -77,6 +77,18 @@ def test_all_in_all_no_more_than_flying_on_until_the_battery_says_turn_back(give
     assert given_costs.total_s(best_sorties(given_costs, iterations=20)) <= given_costs.total_s(simple) + 1e-9
 
 
+@settings(max_examples=20, deadline=None)
+@given(costs())
+def test_another_order_is_not_taken_where_the_map_loses_by_it(given_costs: SortieCosts) -> None:
+    def error(flights: list[list[int]]) -> float:
+        return float(any(second != first + 1 for flight in flights for first, second in itertools.pairwise(flight)))
+
+    found = best_sorties(given_costs, iterations=20, error=error)
+    assert error(found) == 0.0
+    assert given_costs.total_s(found) <= given_costs.total_s(cut_route(given_costs))
+    assert best_sorties(given_costs, iterations=20, error=lambda _: 1.0) == best_sorties(given_costs, iterations=20)
+
+
 @settings(max_examples=60, deadline=None)
 @given(costs())
 def test_a_flight_begins_and_ends_at_the_best_home(given_costs: SortieCosts) -> None:

@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.errors import MissionError
-from sparsor.journeys.sorties import Sorties, alone_seconds, sortie_costs, within_reach
+from sparsor.journeys.sorties import MARGIN_S, Sorties, alone_seconds, sortie_costs, within_reach
 from sparsor.mission.apart import flights_apart
-from sparsor.mission.fleet import balanced_flights
+from sparsor.mission.fleet import balanced_flights, cut_evenly, longest_s
 from sparsor.vehicle import usable_seconds
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sparsor.journeys.flights import Flights
+    from sparsor.journeys.sorties import OrderError
     from sparsor.mission import Home, MissionPlan
     from sparsor.mission.fleet import Cut
+    from sparsor.mission.sorties import SortieCosts
 
 FAILSAFE = (
     "A failsafe return flies straight home at the vehicle's own return height, through the others' heights: set "
@@ -25,8 +29,8 @@ FAILSAFE = (
 )
 
 
-def cut_for_vehicles(flights: Flights) -> Sorties | str:
-    """Return one flight a vehicle, all at once, or a sentence that says why there are none.
+def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorties | str:
+    """Return one flight a vehicle, all at once, or a sentence that says why there are none; parameters as for sorties.
 
     Raises
     ------
@@ -40,17 +44,28 @@ def cut_for_vehicles(flights: Flights) -> Sorties | str:
     if said:
         return said
     costs = sortie_costs(flights, flights.homes, kept, alone_s[:, kept])
-    cut = balanced_flights(costs, min(flight.vehicles, kept.size), seed=flights.spec.search.seed)
+    cut = _balanced(flights, costs, kept, error)
     sorties = _apart(flights, [(home, kept[stops].tolist()) for home, stops in cut])
     usable_s = usable_seconds(vehicle)
-    longest_s = max(time.used_s for time in sorties.times)
-    if longest_s > usable_s:
+    longest_used_s = max(time.used_s for time in sorties.times)
+    if longest_used_s > usable_s:
         return (
             f"{flight.vehicles} vehicles at once are not enough for the route: the longest flight would take "
-            f"{longest_s / 60:.1f} of {usable_s / 60:.1f} min. Take more --vehicles, or leave them out and fly one "
-            "sortie after the other."
+            f"{longest_used_s / 60:.1f} of {usable_s / 60:.1f} min. Take more --vehicles, or leave them out and fly "
+            "one sortie after the other."
         )
     return replace(sorties, dropped=np.setdiff1d(np.arange(flights.stops.size), kept))
+
+
+def _balanced(flights: Flights, costs: SortieCosts, kept: NDArray[np.int64], error: OrderError | None) -> Cut:
+    """Return flights whose longest is short; in another order than the route's where the map does not lose by it."""
+    vehicles = min(flights.spec.flight.vehicles, kept.size)
+    found = balanced_flights(costs, vehicles, seed=flights.spec.search.seed)
+    even = cut_evenly(costs, vehicles)
+    if error is None or found == even or longest_s(costs, even) > costs.limit_s - MARGIN_S:
+        return found
+    lost = error([kept[stops] for _, stops in found]) > error([kept[stops] for _, stops in even])
+    return even if lost else found
 
 
 def _highest_m(flights: Flights) -> float:

@@ -231,7 +231,12 @@ def _assemble(
     )
     beyond: tuple[str, ...] = ()
     if spec.flight.vehicles > 1 or (spec.flight.sorties and not mission.flyable):
-        cut = cut_for_vehicles(flights) if spec.flight.vehicles > 1 else cut_into_sorties(flights)
+
+        def error(orders: Sequence[NDArray[np.int64]]) -> float:
+            return after(candidate, [flights.tour(order) for order in orders])[0]
+
+        cut_by = cut_for_vehicles if spec.flight.vehicles > 1 else cut_into_sorties
+        cut = cut_by(flights, error if mission.refined else None)
         if isinstance(cut, str):
             beyond = (cut,)
         else:

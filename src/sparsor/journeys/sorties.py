@@ -12,12 +12,14 @@ from sparsor.mission.sorties import SortieCosts, best_sorties
 from sparsor.vehicle import ground_speed_m_s, stop_seconds, turn_seconds, usable_seconds
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.journeys.flights import Flights
     from sparsor.mission import FlightTime, Home, MissionPlan
+
+    OrderError = Callable[[Sequence[NDArray[np.int64]]], float]
 
 SPARE: Final = (1.0, 0.98, 0.95, 0.9, 0.8)  # of the endurance less its reserve, tried in this order
 MARGIN_S: Final = 0.5  # positions are rounded to a centimetre
@@ -50,10 +52,16 @@ class Sorties:
     heights_m: tuple[float, ...] = ()
 
 
-def cut_into_sorties(flights: Flights) -> Sorties | str:
+def cut_into_sorties(flights: Flights, error: OrderError | None = None) -> Sorties | str:
     """Return the flights of a route, or a sentence that says why there are none.
 
     Stops beyond reach are dropped where the mission says so.
+
+    Parameters
+    ----------
+    flights : Flights
+    error : callable, optional
+        To expect of flights over stops at places on the route, where their order matters.
     """
     alone_s = alone_seconds(flights, flights.homes)
     kept, said = within_reach(flights, alone_s)
@@ -65,7 +73,11 @@ def cut_into_sorties(flights: Flights) -> Sorties | str:
         limited = replace(costs, limit_s=spare * usable_s - MARGIN_S)
         if limited.beyond_reach.size:
             break
-        cut = best_sorties(limited, seed=flights.spec.search.seed)
+        cut = best_sorties(
+            limited,
+            seed=flights.spec.search.seed,
+            error=None if error is None else lambda parts: error([kept[part] for part in parts]),
+        )
         orders = tuple(kept[one] for one in cut)
         plans = tuple(flights.build(kept[one], flights.homes[costs.home_of(one)]) for one in cut)
         times = tuple(flights.time(plan) for plan in plans)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -82,7 +82,13 @@ class SortieCosts:
         return np.flatnonzero(alone > self.limit_s)
 
 
-def best_sorties(costs: SortieCosts, *, seed: int = 0, iterations: int = ITERATIONS) -> list[list[int]]:
+def best_sorties(
+    costs: SortieCosts,
+    *,
+    seed: int = 0,
+    iterations: int = ITERATIONS,
+    error: Callable[[list[list[int]]], float] | None = None,
+) -> list[list[int]]:
     """Return the stops of each flight, in order: the route cut best, or PyVRP's, whichever uses less.
 
     Parameters
@@ -91,10 +97,15 @@ def best_sorties(costs: SortieCosts, *, seed: int = 0, iterations: int = ITERATI
         With every stop within reach; stops numbered in the order of the route.
     seed, iterations : int
         Of PyVRP, which ends by a count.
+    error : callable, optional
+        To expect of flights, where it depends on the order of their stops: PyVRP's, which keep no leg of the route for
+        its own sake, have to be no worse than the cut route then.
     """
     cut = cut_route(costs)
     other = routed(costs, seed=seed, iterations=iterations, sorties=len(cut) + SPARE_SORTIES)
-    return cut if other is None or costs.total_s(cut) <= costs.total_s(other) else other
+    if other is None or costs.total_s(cut) <= costs.total_s(other):
+        return cut
+    return cut if error is not None and error(other) > error(cut) else other
 
 
 def cut_route(costs: SortieCosts) -> list[list[int]]:
