@@ -48,7 +48,7 @@ def test_an_edited_plan_is_told_and_what_is_wrong_with_it(console, tmp_path):
 
 
 def test_a_study_is_a_warning_and_against_another_vehicle_a_fault(console, tmp_path):
-    ran = console.mission("--name", "m", "--budget", "30km", "--json", *HOME)
+    ran = console.mission("--name", "m", "--budget", "30km", "--no-sorties", "--json", *HOME)
     assert not ran.result["flyable"]
     checked = console("sparsor", "check", tmp_path / "missions/m", "--json")
     assert checked.code == 0

@@ -102,13 +102,16 @@ def test_warnings_go_to_stderr(console):
 
 @pytest.mark.usefixtures("no_picture")
 def test_a_flight_beyond_the_endurance_is_marked_and_told_what_would_fly(console):
-    ran = console.mission("--hold", "600", "--planner", "monte-carlo", "--json")
+    ran = console.mission("--hold", "600", "--planner", "monte-carlo", "--no-sorties", "--json")
     assert ran.code == 0
     assert ran.result["flyable"] is False
     sentence = ran.result["warnings"][0]
     assert "planning study" in sentence
     assert "shorten --hold" in sentence  # dwelling alone takes longer than the endurance
-    assert "would fit" in console.mission("--budget", "30%", "--json", "--name", "long").result["warnings"][0]
+    assert (
+        "would fit"
+        in console.mission("--budget", "30%", "--no-sorties", "--json", "--name", "long").result["warnings"][0]
+    )
 
 
 @pytest.mark.usefixtures("no_picture")
@@ -267,7 +270,7 @@ def test_no_stop_lies_outside_an_area(console, tmp_path):
     area = tmp_path / "my house.geojson"
     area.write_text(json.dumps({"type": "Polygon", "coordinates": [HOUSE, YARD]}))
     dense = ("--probability", 0.02, "--theta", 1, "--budget", "90%")
-    ran = console.mission("--area", area, "--json", *dense, box=None, iterations=4)
+    ran = console.mission("--area", area, "--json", "--no-sorties", *dense, box=None, iterations=4)
     assert ran.code == 0, ran.err
     assert ran.result["plans"] == ["missions/my-house/my-house.plan"]
     polygon = read_area(area).polygon

@@ -1,11 +1,14 @@
-"""`--sorties`: a route beyond one battery becomes several plans; every stop in one of them, each within endurance."""
+"""A route beyond one battery becomes several plans; every stop in one of them, each within endurance."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from sparsor.design.legs import unit_legs
 from sparsor.journeys.flown import mission_of_folder
 from sparsor.journeys.uploading import choose_plan
 from sparsor.mission import read_plan, time_plan
@@ -28,9 +31,9 @@ HOME = ("--home", 51.504, 25.2815)
 )
 def test_the_sorties_fly_the_route(console, tmp_path, kind, options):
     words = ("--name", "m", "--vehicle", kind, "--json", *HOME, *options)
-    whole = console.mission(*words, iterations=100)
+    whole = console.mission(*words, "--no-sorties", iterations=100)
     planned = read_sidecar(tmp_path / "missions/m/m.npz").stops
-    ran = console.mission(*words, "--sorties", "--force", iterations=100)
+    ran = console.mission(*words, "--force", iterations=100)
     assert ran.code == 0, ran.err
     result, folder = ran.result, tmp_path / "missions/m"
     if whole.result["flyable"]:
@@ -70,19 +73,82 @@ def test_the_sorties_fly_the_route(console, tmp_path, kind, options):
     assert checked.code == 0, checked.out
     assert names[0] in checked.out
     # Made again as one study, no old sortie lies beside it.
-    again = console.mission(*words, "--force", iterations=100)
+    again = console.mission(*words, "--no-sorties", "--force", iterations=100)
     assert again.code == 0
     assert [path.name for path in folder.glob("*.plan")] == ["m.plan"]
 
 
 def test_what_is_beyond_reach_stays_a_study(console):
-    ran = console.mission("--name", "m", "--home", 51.2, 25.2, "--sorties", "--json")
+    ran = console.mission("--name", "m", "--home", 51.2, 25.2, "--json")
     assert ran.code == 0
     assert not ran.result["flyable"]
     assert ran.result["sorties"] == 1
+    assert ran.result["warnings"][0].startswith("A planning study")
     assert any("are farther from home than one battery reaches" in one for one in ran.result["warnings"])
+    assert any("1, 2, 3, 4, 5" in one and "--drop-unreachable" not in one for one in ran.result["warnings"])
+    asked = console.mission("--name", "m", "--home", 51.2, 25.2, "--drop-unreachable", "--json", "--force")
+    assert (asked.code, asked.result["flyable"]) == (0, False)  # nothing would be left
+
+
+def test_what_is_beyond_reach_is_named_or_left_out(console, tmp_path):
+    words = ("--name", "m", "--home", 51.4455, 25.27, "--json", "--budget", "20km")
+    study = console.mission(*words, iterations=100)
+    assert (study.code, study.result["flyable"], study.result["stops_dropped"]) == (0, False, 0)
+    said = next(one for one in study.result["warnings"] if "beyond" in one or "farther from home" in one)
+    count = int(re.search(r"sorties: (\d+) of", said)[1])
+    named = [int(number) for number in re.search(r"\(([0-9, ]+)", said)[1].split(",") if number.strip()]
+    assert len(named) == min(count, 10)
+    assert f"and {count - 10} more" in said or count <= 10
+
+    ran = console.mission(*words, "--drop-unreachable", "--force", iterations=100)
+    assert ran.code == 0, ran.err
+    result, vehicle = ran.result, load_vehicle("quad")
+    assert result["flyable"]
+    assert result["stops_dropped"] == count
+    assert result["stops"] == study.result["stops"] - count
+    kept = read_sidecar(tmp_path / "missions/m/m.npz")
+    assert kept.stops.size == result["stops"]
+    lost = result["expected_relative_error"] - study.result["expected_relative_error"]
+    assert lost > 0
+    warning = next(one for one in result["warnings"] if "left out" in one)
+    assert warning.startswith(f"{count} of {study.result['stops']} stops are beyond reach")
+    assert f"{result['expected_relative_error']:.3f}" in warning
+    assert f"{study.result['expected_relative_error']:.3f}" in warning
+    for path in result["plans"]:
+        assert time_plan(read_plan(Path(path)), vehicle).used_s <= vehicle.endurance_s * (1 - vehicle.reserve_fraction)
+    assert console("sparsor", "check", tmp_path / "missions/m").code == 0
+
+
+def test_what_is_left_out_needs_sorties(console):
+    ran = console.mission("--no-sorties", "--drop-unreachable")
+    assert ran.code == 2
+    assert "leave out --no-sorties" in ran.err
+
+
+def test_the_error_is_that_of_what_the_sorties_fly(console, tmp_path):
+    words = ("--name", "m", "--budget", "20km", "--json", *HOME)
+    whole = console.mission(*words, "--no-sorties", iterations=100)
+    ran = console.mission(*words, "--force", iterations=100)
+    sidecar, result = read_sidecar(tmp_path / "missions/m/m.npz"), ran.result
+    assert result["sorties"] > 1
+    legs = unit_legs(sidecar.grid.shape)
+    flown = [sidecar.grid.cell_at(*zip(*((s.lon_deg, s.lat_deg) for s in read_plan(Path(path)).stops), strict=True))
+             for path in result["plans"]]  # fmt: skip
+    under = set(np.concatenate([legs.cells_under(one) for one in flown]).tolist())
+    assert set(np.flatnonzero(sidecar.phi.any(axis=0)).tolist()) == under
+    assert result["cells_flown_over"] == result["cells_measured"] == len(under)
+    assert result["expected_relative_error"] != whole.result["expected_relative_error"]
+    assert sidecar.expected["relative_error"] == result["expected_relative_error"]
+
+
+def test_the_paper_s_sums_do_not_depend_on_the_order(console):
+    words = ("--name", "m", "--planner", "monte-carlo", "--budget", "20km", "--json", *HOME)
+    whole = console.mission(*words, "--no-sorties")
+    ran = console.mission(*words, "--force")
+    assert ran.result["sorties"] > 1
+    assert ran.result["expected_relative_error"] == whole.result["expected_relative_error"]
 
 
 def test_quiet_prints_every_plan(console):
-    ran = console.mission("--name", "m", "--budget", "30km", "--sorties", "-q", *HOME, iterations=100)
+    ran = console.mission("--name", "m", "--budget", "30km", "-q", *HOME, iterations=100)
     assert ran.out.split() == [f"missions/m/m-{n}.plan" for n in range(1, len(ran.out.split()) + 1)]

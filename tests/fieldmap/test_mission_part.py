@@ -72,3 +72,11 @@ def test_a_log_from_elsewhere_is_refused_with_the_distance():
 
 def test_missed_stops_in_flight_order():
     assert missed_stops(np.array([9, 3, 7, 1]), np.array([1, 3])).tolist() == [9, 7]
+
+
+def test_each_of_several_heights_is_the_mission_s():
+    heights = np.repeat([0.0, 50.0, 90.0, 130.0], [5, 60, 50, 60])
+    samples = samples_at(0.5, 0.5, np.zeros(heights.size), height_m=heights)
+    part = mission_part(samples, GRID, 50.0, heights_m=(50.0, 130.0))
+    assert np.array_equal(part.in_flight, np.isin(heights, [50.0, 130.0]))
+    assert part.warnings == ()

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sparsor.mission.fleet import balanced_flights, cut_evenly, longest_s
 from sparsor.mission.sorties import SortieCosts, best_sorties, cut_route, routed
 
 
 @st.composite
-def costs(draw: st.DrawFn, most: int = 12) -> SortieCosts:
-    """Stops in a square, a home somewhere, a wind that makes one direction longer, a limit within reach."""
+def costs(draw: st.DrawFn, most: int = 12, homes: int = 3) -> SortieCosts:
+    """Stops in a square, homes somewhere, a wind that makes one direction longer, a limit within reach."""
     count = draw(st.integers(1, most))
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     places = rng.uniform(0, 1000, (count, 2))
-    home = rng.uniform(-500, 1500, 2)
+    home = rng.uniform(-500, 1500, (draw(st.integers(1, homes)), 1, 2))
     wind = rng.uniform(-0.3, 0.3, 2)
 
     def seconds(start: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -27,7 +29,7 @@ def costs(draw: st.DrawFn, most: int = 12) -> SortieCosts:
     out, back = seconds(home, places), seconds(places, home)
     stop = rng.uniform(0, 60, count)
     fixed = draw(st.floats(0, 100))
-    alone = fixed + out + back + stop
+    alone = fixed + (out + back).min(axis=0) + stop
     return SortieCosts(
         seconds(places[:, None], places), out, back, stop, fixed, float(alone.max()) * draw(st.floats(1.001, 3))
     )
@@ -36,7 +38,7 @@ def costs(draw: st.DrawFn, most: int = 12) -> SortieCosts:
 @settings(max_examples=60, deadline=None)
 @given(costs())
 def test_every_stop_is_flown_once_within_the_limit(given_costs: SortieCosts) -> None:
-    count = len(given_costs.out_s)
+    count = given_costs.count
     assert not given_costs.beyond_reach.size
     found = best_sorties(given_costs, iterations=60)
     assert sorted(itertools.chain(*found)) == list(range(count))
@@ -52,7 +54,7 @@ def test_every_stop_is_flown_once_within_the_limit(given_costs: SortieCosts) -> 
 @settings(max_examples=60, deadline=None)
 @given(costs(most=8))
 def test_no_cut_of_the_route_uses_less(given_costs: SortieCosts) -> None:
-    count = len(given_costs.out_s)
+    count = given_costs.count
     best = min(
         given_costs.total_s(parts)
         for cuts in itertools.product([False, True], repeat=count - 1)
@@ -65,6 +67,74 @@ def test_no_cut_of_the_route_uses_less(given_costs: SortieCosts) -> None:
 def _parts(count: int, cuts: tuple[bool, ...]) -> list[list[int]]:
     edges = [0, *(place + 1 for place, cut in enumerate(cuts) if cut), count]
     return [list(range(*pair)) for pair in itertools.pairwise(edges)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(costs())
+def test_all_in_all_no_more_than_flying_on_until_the_battery_says_turn_back(given_costs: SortieCosts) -> None:
+    simple = simple_cut(given_costs)
+    assert sorted(itertools.chain(*simple)) == list(range(given_costs.count))
+    assert given_costs.total_s(best_sorties(given_costs, iterations=20)) <= given_costs.total_s(simple) + 1e-9
+
+
+@settings(max_examples=20, deadline=None)
+@given(costs())
+def test_another_order_is_not_taken_where_the_map_loses_by_it(given_costs: SortieCosts) -> None:
+    def error(flights: list[list[int]]) -> float:
+        return float(any(second != first + 1 for flight in flights for first, second in itertools.pairwise(flight)))
+
+    found = best_sorties(given_costs, iterations=20, error=error)
+    assert error(found) == 0.0
+    assert given_costs.total_s(found) <= given_costs.total_s(cut_route(given_costs))
+    assert best_sorties(given_costs, iterations=20, error=lambda _: 1.0) == best_sorties(given_costs, iterations=20)
+
+
+@settings(max_examples=60, deadline=None)
+@given(costs())
+def test_a_flight_begins_and_ends_at_the_best_home(given_costs: SortieCosts) -> None:
+    for flight in best_sorties(given_costs, iterations=20):
+        used_s = [given_costs.used_s(flight, home) for home in range(given_costs.homes)]
+        assert given_costs.used_s(flight) == used_s[given_costs.home_of(flight)] == min(used_s)
+    fewer = replace(given_costs, out_s=given_costs.out_s[:1], back_s=given_costs.back_s[:1])
+    if not fewer.beyond_reach.size:
+        assert given_costs.total_s(cut_route(given_costs)) <= fewer.total_s(cut_route(fewer)) + 1e-9
+
+
+@settings(max_examples=40, deadline=None)
+@given(costs(most=7, homes=1), st.integers(1, 4), st.booleans(), st.integers(0, 99))
+def test_no_cut_for_several_vehicles_has_a_shorter_longest_flight(given_costs, vehicles, own, seed) -> None:
+    if own and vehicles > 1:
+        farther = np.random.default_rng(seed).uniform(0, 300, (vehicles, 1))
+        given_costs = replace(
+            given_costs, out_s=given_costs.out_s + farther, back_s=given_costs.back_s + farther
+        )  # fmt: skip
+    count = given_costs.count
+    least = min(
+        max(given_costs.used_s(part, home) for part, home in zip(parts, homes, strict=True))
+        for cuts in itertools.product([False, True], repeat=count - 1)
+        for parts in [_parts(count, cuts)]
+        if len(parts) <= vehicles
+        for homes in (itertools.permutations(range(vehicles), len(parts)) if own else [(0,) * len(parts)])
+    )
+    even = cut_evenly(given_costs, vehicles)
+    assert np.isclose(longest_s(given_costs, even), least)
+    found = balanced_flights(given_costs, vehicles, iterations=20)
+    assert sorted(itertools.chain(*(stops for _, stops in found))) == list(range(count))
+    assert len(found) <= vehicles
+    assert longest_s(given_costs, found) <= longest_s(given_costs, even) + 1e-9
+    if own:
+        assert len({home for home, _ in found}) == len(found)
+
+
+def simple_cut(given_costs: SortieCosts) -> list[list[int]]:
+    """Along the route, each flight as far as it can and still come home."""
+    flights, flight = [], []
+    for stop in range(given_costs.count):
+        if flight and given_costs.used_s([*flight, stop]) > given_costs.limit_s:
+            flights.append(flight)
+            flight = []
+        flight.append(stop)
+    return [*flights, flight]
 
 
 def test_a_leg_that_may_not_be_flown_is_not() -> None:

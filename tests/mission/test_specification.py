@@ -104,7 +104,8 @@ def test_everything_left_out_is_filled_in():
     }  # fmt: skip
     assert filled["flight"] == {
         "vehicle": "quad", "autopilot": "ardupilot", "altitude_m": 50.0, "hold_s": 5.0, "fence_margin_m": 50.0,
-        "sorties": False, "keep_out": (), "keep_out_margin_m": 30.0,
+        "sorties": True, "keep_out": (), "keep_out_margin_m": 30.0, "homes": (), "drop_unreachable": False,
+        "vehicles": 1, "separation_m": 10.0,
     }  # fmt: skip
     assert spec(search={"seed": None}) == spec()
 
@@ -178,3 +179,14 @@ def test_filled_in_values_follow_from_what_is_asked_for_now():
     assert (free.search.budget, free.search.probability, free.search.theta) == (None, 0.03, 3)
     again = changed(free, {"search": {"budget": "20%"}}, base=Path("/"))
     assert (again.search.budget, again.search.probability, again.search.theta) == ("20%", None, None)
+
+
+def test_homes_given_take_the_place_of_those_before():
+    one, two = (51.5, 25.3), ((51.5, 25.3), (51.6, 25.3))
+    several = spec(flight={"homes": two})
+    assert several.flight.given_homes == two
+    single = changed(several, {"flight": {"home": one}}, base=Path("/"))
+    assert single.flight.given_homes == (one,)
+    assert changed(single, {"flight": {"homes": two}}, base=Path("/")).flight == several.flight
+    with pytest.raises(MissionError, match="either one home or several"):
+        spec(flight={"home": one, "homes": two})

@@ -44,6 +44,7 @@ def check(
                 "plans": [str(one) for one in found.plans],
                 "faults": list(found.faults),
                 "warnings": list(found.warnings),
+                "vehicles_apart_m": found.apart_m,
             }
         )
     else:
@@ -53,5 +54,7 @@ def check(
             typer.echo(fault)
         if not quiet and not found.faults:
             typer.echo(f"{', '.join(one.name for one in found.plans)}: no fault noticed")
+        if not quiet and found.apart_m is not None:
+            typer.echo(f"vehicles at once: planned paths {found.apart_m:.1f} m apart at least, whenever each starts")
     if found.faults:
         raise typer.Exit(1)

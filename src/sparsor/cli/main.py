@@ -13,6 +13,7 @@ from sparsor.cli.fetch import fetch
 from sparsor.cli.fly import fly
 from sparsor.cli.inspect import inspect
 from sparsor.cli.learn import learn
+from sparsor.cli.places import WithPlaces
 from sparsor.cli.plan import plan
 from sparsor.cli.reconstruct import reconstruct
 from sparsor.cli.record import record
@@ -37,7 +38,7 @@ def _program(name: str, *, no_args_is_help: bool = False) -> typer.Typer:
 
 
 app = _program("sparsor", no_args_is_help=True)
-app.command("plan")(plan)
+app.command("plan", cls=WithPlaces)(plan)
 app.command("reconstruct")(reconstruct)
 app.command("learn")(learn)
 app.command("inspect")(inspect)
@@ -55,7 +56,7 @@ app.command("fetch")(fetch)
 def _alone(name: str, command: Callable[..., None]) -> typer.Typer:
     """Return a program of one command, for those that people type most under their own names."""
     program = _program(name)
-    program.command()(command)
+    program.command(cls=WithPlaces)(command)
     return program
 
 

@@ -21,6 +21,7 @@ from sparsor.cli.console import (
     reporting,
     warn,
 )
+from sparsor.cli.places import homes_given
 from sparsor.cli.resuming import Flown, check_asked, check_given, resumed_request
 from sparsor.cli.summary import curve_table, mission_rows, mission_values
 
@@ -218,8 +219,13 @@ def plan(
         ),
     ] = None,
     home: Annotated[
-        tuple[float, float] | None,
-        _option(FLIGHT, "Take-off and landing place (default: the first stop).", "--home", metavar="LON LAT"),
+        list[str] | None,
+        _option(
+            FLIGHT,
+            "Take-off and landing place (default: the first stop); repeatable: each flight has the best of them.",
+            "--home",
+            metavar="LON LAT",
+        ),
     ] = None,
     home_altitude: Annotated[
         float | None,
@@ -230,13 +236,26 @@ def plan(
         _option(FLIGHT, "Wind to plan for: m/s, and where it comes from.", "--wind", metavar="SPEED FROM_DEG"),
     ] = None,
     sorties: Annotated[
-        bool,
+        bool | None,
         typer.Option(
-            "--sorties",
-            help="Cut a route beyond one battery into flights from home and back, NAME-1.plan, NAME-2.plan ...",
+            "--sorties/--no-sorties",
+            help="Whether a route beyond one battery is cut into flights from home and back, NAME-1.plan, NAME-2.plan "
+            "... (default), or stays one planning study.",
             rich_help_panel=FLIGHT,
+            show_default=False,
         ),
+    ] = None,
+    drop_unreachable: Annotated[
+        bool,
+        typer.Option("--drop-unreachable", help="Leave out stops beyond reach of one battery.", rich_help_panel=FLIGHT),
     ] = False,
+    vehicles: Annotated[
+        int | None, _option(FLIGHT, "Fly with this many at once, 1..8, each on a part of the route.", "--vehicles")
+    ] = None,
+    separation: Annotated[
+        float | None,
+        _option(FLIGHT, "Least distance between vehicles at once, m (default: 10).", "--separation", metavar="M"),
+    ] = None,
     keep_out: Annotated[
         list[Path] | None,
         _option(
@@ -343,10 +362,13 @@ def plan(
             "altitude_m": altitude,
             "speed_m_s": speed,
             "hold_s": hold,
-            "home": home,
+            **homes_given(home),
             "home_altitude_m": home_altitude,
             "wind": wind,
-            "sorties": sorties or None,
+            "sorties": sorties,
+            "drop_unreachable": drop_unreachable or None,
+            "vehicles": vehicles,
+            "separation_m": separation,
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
         },
@@ -442,6 +464,7 @@ def _as_typed(message: str) -> str:
     message = message.replace("search.time_s", "--time").replace("prior.time", "--field-time")
     message = message.replace("coast.file", "--coastline").replace("coast.accuracy_m", "--coastline-accuracy")
     message = re.sub(r"\bcoast: ", "--coastline: ", message)
+    message = re.sub(r"\bflight\.homes\b(?:\.\d+)?", "flight.home", message)
     message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
     """Return what --json prints; SI units in the key names."""
-    spec, found = mission.specification, mission.candidate
+    spec, found = mission.specification, mission.measured
     return {
         "plans": [str(folder / file) for file in mission.plan_files],
         "sidecar": str(folder / f"{spec.name}.npz"),
@@ -33,6 +33,9 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "endurance_s": mission.vehicle.endurance_s,
         "flyable": mission.flyable,
         "sorties": len(mission.plans),
+        "stops_dropped": int(mission.sorties.dropped.size) if mission.sorties else 0,
+        "vehicles": spec.flight.vehicles,
+        "vehicles_apart_m": mission.sorties.apart_m if mission.sorties else None,
         "sortie_times_s": [time.seconds for time in mission.sorties.times] if mission.sorties else [],
         "expected_relative_error": mission.expected_relative_error,
         "expected_relative_error_cells": mission.expected_relative_error_cells,
@@ -89,9 +92,10 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|, from the "
             + (
                 ("cells flown over)" if mission.before is None else "cells of all flights together)")
-                if spec.search.planner == "refined"
+                if mission.refined
                 else f"{spec.search.rows} sums); {mission.expected_relative_error_cells:.2f} from single cells"
-            ),
+            )
+            + ("" if mission.sorties is None else ", of what the sorties fly"),
         ),
         (
             "prior",
@@ -141,10 +145,10 @@ def _map(mission: PlannedMission) -> list[tuple[str, str]]:
 
 
 def _stops(mission: PlannedMission) -> str:
-    stops, over = mission.candidate.stops.size, mission.cells_flown_over
+    stops, over = mission.measured.stops.size, mission.cells_flown_over
     if mission.candidate.dwells is None:
         return f"{stops} cells measured, {over} flown over"
-    holds_s = [stop.hold_s for stop in mission.plan.stops if stop.hold_s > 0]
+    holds_s = [stop.hold_s for plan in mission.plans for stop in plan.stops if stop.hold_s > 0]
     dwells = f"; {sum(holds_s):g} s of dwelling at {len(holds_s)} of them" if holds_s else ", none dwelt at"
     return f"{stops} turning points{dwells}; {over} cells flown over and measured"
 
@@ -156,8 +160,9 @@ def _flyable(mission: PlannedMission) -> str:
         return "yes, by endurance"
     if len(mission.plans) == 1:
         return f"yes, by endurance, in another order: {mission.sorties.times[0].seconds / 60:.1f} min"
+    kind = "sorties" if mission.sorties.apart_m is None else "flights at once"
     return (
-        f"in {len(mission.plans)} sorties: "
+        f"in {len(mission.plans)} {kind}: "
         + ", ".join(f"{one.seconds / 60:.1f}" for one in mission.sorties.times)
         + " min"
     )
@@ -181,7 +186,7 @@ def curve_table(
             f"{one.path_length_m / 1000:.2f}",
             f"{one.coverage_fraction:.1%}",
             f"{one.flight_time_s / 60:.1f}",
-            "yes" if one.flyable else "no",
+            ("yes" if len(one.plans) == 1 else f"in {len(one.plans)} sorties") if one.flyable else "no",
             f"{one.expected_relative_error:.3f}",
         )
         for one in curve

@@ -17,6 +17,8 @@ from sparsor.fieldmap.path import DWELL_M_S, path_of
 from sparsor.fieldmap.response import TAU_PER_T90, quicker_fits_better
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from sparsor.design.decoders.measurements import Measurements
@@ -97,6 +99,7 @@ def measure(
     t90_s: float | None = None,
     stops: NDArray[np.int64] | None = None,
     altitude_m: float | None = None,
+    heights_m: Sequence[float] = (),
 ) -> Measured:
     """Return what a flight measured, with what was left out and why.
 
@@ -114,6 +117,8 @@ def measure(
         Planned cells in flight order.
     altitude_m : float, optional
         The mission's height above home.
+    heights_m : sequence of float
+        Those of several vehicles at once.
 
     Raises
     ------
@@ -122,7 +127,7 @@ def measure(
     DesignError
         When fewer than two cells were measured.
     """
-    part = mission_part(samples, grid, altitude_m)
+    part = mission_part(samples, grid, altitude_m, heights_m=heights_m)
     reading = samples.value if value is None else value
     reason = sensor_faults(samples.time_s, samples.boot, samples.value, profile)
     reason[np.isnan(reading)] = Reason.UNCALIBRATED

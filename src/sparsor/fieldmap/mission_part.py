@@ -11,6 +11,8 @@ from sparsor.errors import LogError
 from sparsor.geodesy.lengths import distance_m
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from sparsor.flightlog.sampling import Samples
@@ -42,7 +44,9 @@ class MissionPart:
     warnings: tuple[str, ...]
 
 
-def mission_part(samples: Samples, grid: Grid, altitude_m: float | None = None) -> MissionPart:
+def mission_part(
+    samples: Samples, grid: Grid, altitude_m: float | None = None, *, heights_m: Sequence[float] = ()
+) -> MissionPart:
     """Tell the mission from the way to it, take-off and landing.
 
     Samples of unknown height count as of the mission's. A vehicle that stays on the ground is on its mission
@@ -56,6 +60,9 @@ def mission_part(samples: Samples, grid: Grid, altitude_m: float | None = None) 
         The mission's height above home. Without it, or where nothing was flown at it, all above half of the height
         that was flown most counts. Where only altitudes above the sea are known, nobody knows how high home is: what
         was flown most is taken for the mission's height.
+    heights_m : sequence of float
+        Heights of several vehicles at once, each as good as the other; where only altitudes above the sea are known all
+        above half of what was flown most counts.
 
     Raises
     ------
@@ -75,8 +82,14 @@ def mission_part(samples: Samples, grid: Grid, altitude_m: float | None = None) 
     airborne = unknown | (height_m >= _AIRBORNE * usual_m) | (usual_m < LEAST_BAND_M)
     if altitude_m is None:
         return MissionPart(airborne, cell, ())
-    half_m = max(BAND * altitude_m, LEAST_BAND_M)
-    in_band = unknown | (np.abs(height_m - (altitude_m if from_home else usual_m)) <= half_m)
+    if len(heights_m) > 1:
+        if not from_home:
+            return MissionPart(airborne, cell, ())
+        bands = [np.abs(height_m - one_m) <= max(BAND * one_m, LEAST_BAND_M) for one_m in heights_m]
+        in_band = unknown | np.any(bands, axis=0)
+    else:
+        half_m = max(BAND * altitude_m, LEAST_BAND_M)
+        in_band = unknown | (np.abs(height_m - (altitude_m if from_home else usual_m)) <= half_m)
     if 2 * (in_band & inside).sum() >= (airborne & inside).sum():
         return MissionPart(in_band, cell, ())
     warning = (

@@ -23,6 +23,66 @@ def advice(mission: PlannedMission) -> tuple[str, ...]:
     return tuple(sentence for sentence in said if sentence)
 
 
+def said_of(mission: PlannedMission, whole: PlannedMission) -> str:
+    """Return what has to be said about sorties, beside the same mission as one flight.
+
+    Parameters
+    ----------
+    mission, whole : PlannedMission
+    """
+    cut = mission.sorties
+    assert cut is not None
+    said = [*_dropped(mission), _cut_into(mission)]
+    if cut.dropped.size or mission.expected_relative_error != whole.expected_relative_error:
+        said.append(
+            f"The expected error is {mission.expected_relative_error:.3f}, that of the legs that are flown; the whole "
+            f"route in one flight would have {whole.expected_relative_error:.3f}."
+        )
+    return " ".join(said)
+
+
+def _dropped(mission: PlannedMission) -> tuple[str, ...]:
+    assert mission.sorties is not None
+    count, all_of_them = mission.sorties.dropped.size, mission.candidate.stops.size
+    if not count:
+        return ()
+    are = "stop is" if count == 1 else "stops are"
+    return (f"{count} of {all_of_them} {are} beyond reach of one battery and left out (--drop-unreachable).",)
+
+
+def _cut_into(mission: PlannedMission) -> str:
+    cut = mission.sorties
+    assert cut is not None
+    usable_min = mission.usable_s / 60
+    if cut.apart_m is not None:
+        heights = ", ".join(f"{height_m:g}" for height_m in cut.heights_m)
+        up = f", at {heights} m (ceiling {mission.vehicle.ceiling_m:g} m)" if mission.vehicle.flies else ""
+        level = ", if the homes lie level" if up else ""
+        places = "; ".join(f"{plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}" for plan in cut.plans)
+        return (
+            f"{len(cut.plans)} vehicles at once, none above {max(time.used_s for time in cut.times) / 60:.1f} of "
+            f"{usable_min:.1f} min{up}, each from a home of its own (see whether it can be used): {places}. Their "
+            f"planned paths are never nearer than {_tenth_down(cut.apart_m)} m, whenever each starts{level}; what they "
+            "drift off their paths comes off that."
+        )
+    if len(cut.plans) > 1:
+        return (
+            f"One battery is not enough for the route: it is cut into {len(cut.plans)} sorties, "
+            f"{sum(time.seconds for time in cut.times) / 60:.0f} min in all, none above "
+            f"{max(time.used_s for time in cut.times) / 60:.1f} of {usable_min:.1f} min."
+        )
+    used = f"{cut.times[0].used_s / 60:.1f} of {usable_min:.1f} min"
+    if mission.specification.flight.vehicles > 1:
+        return f"One vehicle flies it all: {used}."
+    if cut.dropped.size:
+        return f"The others are one flight of {used}."
+    return f"The route as it was found takes more than one battery; its stops in another order take {used}."
+
+
+def _tenth_down(metres: float) -> str:
+    return f"{floor(metres * 10 + 1e-3) / 10:.1f}"
+
+
 def _what_would_fly(mission: PlannedMission) -> str:
     if mission.flyable:
         return ""
@@ -56,7 +116,7 @@ def _seconds_at_any_size(mission: PlannedMission) -> float:
     """Return the part of the flight that a smaller box would not shorten."""
     flight, plan = mission.specification.flight, mission.plan
     # A home of its own stays where it is; one at the first stop comes nearer with the rest.
-    transit_m = 0.0 if flight.home is None else mission.flown_length_m - mission.path_length_m
+    transit_m = mission.flown_length_m - mission.path_length_m if flight.given_homes else 0.0
     beside_s = mission.used_s - mission.flight_time_s  # hovering takes more out of the battery than cruising
     return beside_s + flight_seconds(
         mission.vehicle,

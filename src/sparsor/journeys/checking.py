@@ -10,6 +10,8 @@ from sparsor.journeys.flown import is_edited, plan_changes, sidecar_of
 from sparsor.journeys.folder import SPECIFICATION_FILE
 from sparsor.journeys.uploading import choose_plan, profile_of
 from sparsor.mission import Fault, check_faults, judged_faults, read_plan
+from sparsor.mission.apart import TOLERANCE_M
+from sparsor.mission.separation import nearest
 from sparsor.mission.specification import read_specification
 from sparsor.vehicle import CALM, SteadyWind, load_vehicle
 
@@ -30,11 +32,14 @@ class Check:
     faults, warnings : tuple of str
         Sentences: what a plan fails by, and what has to be known. No fault means that none was noticed; it says
         nothing of rules, obstacles or terrain.
+    apart_m : float or None
+        Of the plans of vehicles at once: their planned paths are never nearer, whenever each starts.
     """
 
     plans: tuple[Path, ...]
     faults: tuple[str, ...]
     warnings: tuple[str, ...]
+    apart_m: float | None = None
 
 
 def check_plans(path: Path, vehicle: str | None = None) -> Check:
@@ -61,10 +66,32 @@ def check_plans(path: Path, vehicle: str | None = None) -> Check:
         for one in plans
         for fault in _faults(one, vehicle)
     ]
+    apart_m, too_near = _apart(path, plans, vehicle) if path.is_dir() else (None, ())
     return Check(
         plans,
-        tuple(sentence for sentence, fails in found if fails),
+        (*(sentence for sentence, fails in found if fails), *too_near),
         tuple(sentence for sentence, fails in found if not fails),
+        apart_m,
+    )
+
+
+def _apart(folder: Path, plans: tuple[Path, ...], vehicle: str | None) -> tuple[float | None, tuple[str, ...]]:
+    """Return the least distance between the vehicles of a mission for several at once, and what is wrong with it."""
+    try:
+        spec = read_specification(folder / SPECIFICATION_FILE)
+    except InputError:
+        return None, ()
+    own = [one for one in plans if one.stem.startswith(spec.name)]
+    profile = (profile_of(own[0]) if vehicle is None else load_vehicle(vehicle)) if own else None
+    if spec.flight.vehicles == 1 or len(own) < 2 or profile is None:
+        return None, ()
+    found = nearest([read_plan(one) for one in own], profile)
+    apart_m, least_m = found.distance_m, spec.flight.separation_m
+    if apart_m >= least_m - TOLERANCE_M:
+        return apart_m, ()
+    return apart_m, (
+        f"{own[found.first].name} and {own[found.second].name} may come as near as {apart_m:.1f} m to each other when "
+        f"they are flown at once; the mission asks for {least_m:g} m.",
     )
 
 

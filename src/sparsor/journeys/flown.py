@@ -59,6 +59,8 @@ class FlownMission:
         How many of the stops earlier flights measured, whose logs belong to the map too.
     home : tuple of float or None
         Longitude and latitude, degrees.
+    heights_m : tuple of float
+        Of vehicles at once, each its own.
     """
 
     name: str
@@ -75,6 +77,7 @@ class FlownMission:
     warnings: tuple[str, ...]
     earlier: int = 0
     home: tuple[float, float] | None = None
+    heights_m: tuple[float, ...] = ()
 
     @property
     def route(self) -> NDArray[np.int64]:
@@ -109,6 +112,7 @@ def mission_of_folder(folder: Path) -> FlownMission:
         warnings=warnings,
         earlier=sidecar.flown.size,
         home=sidecar.home[:2],
+        heights_m=sidecar.heights_m,
     )
 
 

@@ -119,14 +119,13 @@ def _files_before(folder: Path) -> set[str]:
 
 
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
-    plan, candidate, flight = mission.plan, mission.candidate, mission.specification.flight
+    plan, candidate, flight = mission.plans[0], mission.measured, mission.specification.flight
     passed = [(one.items[index].lon_deg, one.items[index].lat_deg) for one in mission.plans for index in one.passing]
-    flown, before = mission.sorties, mission.before
-    phi = candidate.phi
+    before, phi = mission.before, candidate.phi
     if before is not None:  # the map is made of all flights together
-        measured = np.zeros(phi.shape[1], dtype=np.bool_)
-        measured[before.cells] = True
-        phi = np.eye(phi.shape[1], dtype=np.bool_)[measured | phi.any(axis=0)]
+        cells = np.zeros(phi.shape[1], dtype=np.bool_)
+        cells[before.cells] = True
+        phi = np.eye(phi.shape[1], dtype=np.bool_)[cells | phi.any(axis=0)]
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
@@ -134,9 +133,9 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         kept_out=mission.place.inside & ~mission.place.allowed,
         model=mission.prior.model,
         phi=phi,
-        stops=candidate.stops if flown is None else candidate.stops[np.concatenate(flown.orders)],
+        stops=candidate.stops,
         altitude_m=flight.altitude_m,
-        hold_s=max(stop.hold_s for stop in plan.stops),
+        hold_s=max(stop.hold_s for one in mission.plans for stop in one.stops),
         home=(plan.home.lon_deg, plan.home.lat_deg, plan.home.alt_amsl_m),
         home_altitude_known=plan.home.altitude_known,
         lasso_weight=mission.specification.search.lasso or mission.prior.model.lasso_weight,
@@ -152,4 +151,5 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         sensor=mission.sensor,
         passing=tuple(passed),
         flown=np.zeros(0, dtype=np.int64) if before is None else before.stops,
+        heights_m=() if mission.sorties is None else mission.sorties.heights_m,
     )

@@ -51,12 +51,12 @@ def mission_zones(spec: MissionSpecification, grid: Grid, vehicle: Vehicle, auto
         most_points=autopilot.on_board(vehicle).max_fence_points - MAX_CORNERS,
         longest_leg_m=float(np.hypot(box.east_m, box.north_m)),
     )
-    home = spec.flight.home
-    if home is not None and bool(zones.holds(*home)):
-        raise MissionError(
-            f"home, {home[0]:g} {home[1]:g}, lies in a keep-out ({', '.join(zones.names)}) or within its margin of "
-            f"{spec.flight.keep_out_margin_m:g} m: take off elsewhere (--home LON LAT)"
-        )
+    for home in spec.flight.given_homes:
+        if bool(zones.holds(*home)):
+            raise MissionError(
+                f"home, {home[0]:g} {home[1]:g}, lies in a keep-out ({', '.join(zones.names)}) or within its margin of "
+                f"{spec.flight.keep_out_margin_m:g} m: take off elsewhere (--home LON LAT)"
+            )
     return zones
 
 
@@ -115,7 +115,7 @@ def said_of_shore(mission: PlannedMission) -> tuple[str, ...]:
             f"The way from or to home passes over the {other}"
             + (f", which a {mission.vehicle.kind} cannot: give --home elsewhere." if cannot else ".")
         )
-    if shore.side == "sea" and spec.flight.home is None and mission.vehicle.kind != "boat":
+    if shore.side == "sea" and not spec.flight.given_homes and mission.vehicle.kind != "boat":
         said.append("Home is the first stop, which lies at sea: give --home LON LAT.")
     return tuple(said)
 

@@ -82,7 +82,8 @@ def curve_rows(curve: Sequence[PlannedMission]) -> list[dict[str, object]]:
             "coverage_fraction": one.coverage_fraction,
             "flight_time_s": one.flight_time_s,
             "flyable": one.flyable,
-            "stops": int(one.candidate.stops.size),
+            "sorties": len(one.plans),
+            "stops": int(one.measured.stops.size),
             "cells_flown_over": one.cells_flown_over,
             "expected_relative_error": one.expected_relative_error,
         }

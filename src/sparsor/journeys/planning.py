@@ -12,23 +12,27 @@ from sparsor.core.workers import Workers, workers_of
 from sparsor.design import Weights
 from sparsor.design.expectation import expected_errors
 from sparsor.errors import MissionError
-from sparsor.geodesy.lengths import distance_m, path_length_m
-from sparsor.journeys.advice import advice
+from sparsor.geodesy.lengths import path_length_m
+from sparsor.journeys.advice import advice, said_of
 from sparsor.journeys.algorithm1 import search_algorithm_1
+from sparsor.journeys.fleet import FAILSAFE, cut_for_vehicles
+from sparsor.journeys.flights import whole_flight
+from sparsor.journeys.flownerror import Expected, flown_by_algorithm_1, flown_candidate, flown_refined
 from sparsor.journeys.keepingout import said_of_shore
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
 from sparsor.journeys.resuming import flown_before
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
-from sparsor.mission import Home, MissionPlan, build_mission, check_faults, time_plan, transits
-from sparsor.vehicle import Autopilot, SensorProfile, SteadyWind, Vehicle, usable_seconds
+from sparsor.mission import MissionPlan, check_faults, transits
+from sparsor.vehicle import SensorProfile, SteadyWind, Vehicle, usable_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from sparsor.design import Candidate
+    from sparsor.journeys.flights import Flights
     from sparsor.journeys.modelling import PriorChoice
     from sparsor.journeys.refining import Known
     from sparsor.journeys.resuming import Before
@@ -73,10 +77,12 @@ class PlannedMission:
         The same, decoded from the single cells.
     warnings : tuple of str
     sorties : Sorties or None
-        The flights that the route is cut into, where one is not enough and they were asked for; length, times and
-        errors above are of the uncut route.
+        The flights that the route is cut into, where one is not enough; lengths and times above are of the uncut route,
+        the errors and the cells flown over of what the sorties fly.
     before : Before or None
         What was flown of the mission that this one resumes; the errors above are of all flights together.
+    flown : Candidate or None
+        What the sorties fly: all their stops, one flight after the other, and the Phi that they measure.
     """
 
     specification: MissionSpecification
@@ -97,6 +103,12 @@ class PlannedMission:
     warnings: tuple[str, ...]
     sorties: Sorties | None = None
     before: Before | None = None
+    flown: Candidate | None = None
+
+    @property
+    def measured(self) -> Candidate:
+        """What is flown: the route as it was found, or the sorties over it."""
+        return self.candidate if self.flown is None else self.flown
 
     @property
     def usable_s(self) -> float:
@@ -107,6 +119,11 @@ class PlannedMission:
     def flyable(self) -> bool:
         """Whether the flight, or each of its sorties, fits into the vehicle's endurance less its reserve."""
         return self.used_s <= self.usable_s or self.sorties is not None
+
+    @property
+    def refined(self) -> bool:
+        """Whether the refined search planned it."""
+        return self.specification.search.planner == "refined"
 
     @property
     def plans(self) -> tuple[MissionPlan, ...]:
@@ -195,7 +212,9 @@ def plan_prepared(
                 prepared, problem, spec, begin=begin, known=known, workers=workers, progress=progress
             )
             said = (*((_INTERRUPTED,) if found.interrupted else ()), *(() if before is None else before.warnings))
-            planned = _assemble(spec, prepared, found.candidate, Weights(), (found.error, found.error), said)
+            after = flown_refined(prepared, problem, spec, known)
+            errors = (found.error, found.error)
+            planned = _assemble(spec, prepared, found.candidate, Weights(), errors, after, said)
             return replace(planned, before=before)
 
         mission = made(known)
@@ -205,8 +224,9 @@ def plan_prepared(
         shorter = made(replace(known, home=None))
         return shorter if shorter.flyable else mission
     candidate, weights = search_algorithm_1(problem, spec, workers=workers, progress=progress)
-    expected = expected_errors(problem, candidate, prepared.prior.model.mean)
-    return _assemble(spec, prepared, candidate, weights, expected, ())
+    mean = prepared.prior.model.mean
+    expected = expected_errors(problem, candidate, mean)
+    return _assemble(spec, prepared, candidate, weights, expected, flown_by_algorithm_1(problem, mean), ())
 
 
 def _assemble(
@@ -215,34 +235,15 @@ def _assemble(
     candidate: Candidate,
     weights: Weights,
     expected: tuple[float, float],
+    after: Expected,
     warnings: tuple[str, ...],
 ) -> PlannedMission:
     place, prior, legs, vehicle = prepared.place, prepared.prior, prepared.legs, prepared.vehicle
-    candidate = _nearer_end_first(spec, place, candidate)
-    flight, stops = spec.flight, candidate.stops
-    lon, lat = place.grid.centres_deg(stops)
-    holds_s = np.broadcast_to(_holds_s(flight.hold_s, candidate, prepared.autopilot), stops.shape)
-    home = _home(spec, float(lon[0]), float(lat[0]))
-
-    def build(order: NDArray[np.int64]) -> MissionPlan:
-        return build_mission(
-            lon[order],
-            lat[order],
-            vehicle=vehicle,
-            autopilot=prepared.autopilot,
-            altitude_m=flight.altitude_m,
-            home=home,
-            speed_m_s=flight.speed_m_s,
-            hold_s=holds_s[order],
-            fence_margin_m=flight.fence_margin_m,
-            wind=prepared.wind,
-            zones=place.zones,
-        )
-
-    plan = build(np.arange(stops.size))
-    path_m = legs.path_length(stops)
+    flights, plan = whole_flight(spec, prepared, candidate)
+    candidate = flights.candidate
+    path_m = legs.path_length(candidate.stops)
     transit = sum(path_length_m(*np.transpose(way)) for way in transits(plan))
-    time = time_plan(plan, vehicle, prepared.wind)
+    time = flights.time(plan)
     mission = PlannedMission(
         specification=spec,
         place=place,
@@ -256,29 +257,67 @@ def _assemble(
         flown_length_m=path_m + float(transit),
         flight_time_s=time.seconds,
         used_s=time.used_s,
-        cells_flown_over=legs.cells_under(stops).size,
+        cells_flown_over=legs.cells_under(candidate.stops).size,
         expected_relative_error=expected[0] * prior.widening,
         expected_relative_error_cells=expected[1] * prior.widening,
         warnings=(),
     )
-    if flight.sorties and not mission.flyable:
-        cut = cut_into_sorties(prepared, stops, np.asarray(holds_s, dtype=np.float64), build, spec.search.seed)
+    beyond: tuple[str, ...] = ()
+    if spec.flight.vehicles > 1 or (spec.flight.sorties and not mission.flyable):
+
+        def error(orders: Sequence[NDArray[np.int64]]) -> float:
+            return after(candidate, [flights.tour(order) for order in orders])[0]
+
+        cut_by = cut_for_vehicles if spec.flight.vehicles > 1 else cut_into_sorties
+        cut = cut_by(flights, error if mission.refined else None)
         if isinstance(cut, str):
-            warnings = (*warnings, cut)
+            beyond = (cut,)
         else:
-            mission = replace(mission, sorties=cut)
-            warnings = (*warnings, _said_of(cut, mission))
+            whole, mission = mission, _flown(mission, flights, cut, after)
+            warnings = (
+                *warnings,
+                said_of(mission, whole),
+                *([FAILSAFE] if cut.apart_m is not None and vehicle.flies else []),
+            )
     _check(mission, prepared.wind)
-    said = (*warnings, *advice(mission), *said_of_shore(mission), *plan.warnings, *prior.warnings)
+    said = (*warnings, *advice(mission), *beyond, *said_of_shore(mission), *_of_the_plans(mission), *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
 
 def _from_home(known: Known, spec: MissionSpecification, prepared: Prepared) -> Known:
     """Return what is known with the cell of home, over which the sensor comes to what it knows."""
-    if spec.flight.home is None:
+    if len(spec.flight.given_homes) != 1:
         return known
-    cell = int(prepared.place.grid.cell_at(*spec.flight.home))
+    cell = int(prepared.place.grid.cell_at(*spec.flight.given_homes[0]))
     return replace(known, home=cell) if cell >= 0 else known
+
+
+def _flown(mission: PlannedMission, flights: Flights, cut: Sorties, after: Expected) -> PlannedMission:
+    """Return the mission with its sorties, and the errors to expect of what they fly."""
+    tours = [flights.tour(order) for order in cut.orders]
+    flown = flown_candidate(mission.candidate, cut.orders, tours, flights.prepared.legs, refined=mission.refined)
+    error, error_cells = after(flown, tours)
+    widening = mission.prior.widening
+    return replace(
+        mission,
+        sorties=cut,
+        flown=flown,
+        cells_flown_over=np.unique(np.concatenate([flights.prepared.legs.cells_under(tour) for tour in tours])).size,
+        expected_relative_error=error * widening,
+        expected_relative_error_cells=error_cells * widening,
+    )
+
+
+def _of_the_plans(mission: PlannedMission) -> tuple[str, ...]:
+    """Return what the plans themselves warn of, once; with the plan's name where it is not said of all of them."""
+    plans = mission.plans
+    return tuple(
+        dict.fromkeys(
+            warning if all(warning in one.warnings for one in plans) else f"{file}: {warning}"
+            for file, plan in zip(mission.plan_files, plans, strict=True)
+            for warning in plan.warnings
+        )
+    )
 
 
 def _check(mission: PlannedMission, wind: SteadyWind) -> None:
@@ -287,40 +326,3 @@ def _check(mission: PlannedMission, wind: SteadyWind) -> None:
     faults = [fault.sentence for fault in found if fault.fails]
     if mission.flyable and faults:
         raise MissionError(f"the plan fails its checks and is not written: {' '.join(faults)}")
-
-
-def _said_of(cut: Sorties, mission: PlannedMission) -> str:
-    together_s = sum(time.seconds for time in cut.times)
-    if len(cut.plans) == 1:
-        return (
-            f"The route as it was found takes more than one battery; its stops in another order take "
-            f"{cut.times[0].used_s / 60:.1f} of {mission.usable_s / 60:.1f} min. The expected error is that of the "
-            "route as it was found."
-        )
-    return (
-        f"One battery is not enough for the route: it is cut into {len(cut.plans)} sorties, {together_s / 60:.0f} min "
-        f"in all, none above {max(time.used_s for time in cut.times) / 60:.1f} of {mission.usable_s / 60:.1f} min. The "
-        "expected error is that of the uncut route."
-    )
-
-
-def _nearer_end_first(spec: MissionSpecification, place: Place, candidate: Candidate) -> Candidate:
-    """Return the candidate with its path turned so that it begins at the end nearer home."""
-    if spec.flight.home is None:
-        return candidate
-    first_m, last_m = distance_m(*spec.flight.home, *place.grid.centres_deg(candidate.stops[[0, -1]]))
-    if last_m >= first_m:
-        return candidate
-    dwells = None if candidate.dwells is None else candidate.dwells[::-1].copy()
-    return replace(candidate, stops=candidate.stops[::-1].copy(), dwells=dwells)
-
-
-def _holds_s(hold_s: float, candidate: Candidate, autopilot: Autopilot) -> ArrayLike:
-    """Return the hold at all stops, or at each, seconds."""
-    return hold_s if candidate.dwells is None else autopilot.written_hold_s(hold_s) * candidate.dwells
-
-
-def _home(spec: MissionSpecification, first_lon: float, first_lat: float) -> Home:
-    lon, lat = spec.flight.home or (first_lon, first_lat)
-    altitude = spec.flight.home_altitude_m
-    return Home(lon, lat, altitude or 0.0, altitude_known=altitude is not None)

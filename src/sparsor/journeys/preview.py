@@ -27,10 +27,9 @@ LONGEST_NAME = 18  # that the legend has room for
 
 def preview_png(mission: PlannedMission) -> bytes:
     """Return ``preview.png`` of a mission."""
-    place, plan = mission.place, mission.plan
-    stops = np.array([[stop.lon_deg, stop.lat_deg] for stop in plan.stops])
+    place, plan = mission.place, mission.plans[0]
+    stops = np.array([[stop.lon_deg, stop.lat_deg] for one in mission.plans for stop in one.stops])
     home = np.array([plan.home.lon_deg, plan.home.lat_deg])
-    fence = plan.fences[0]
     prior, label = _prior_map(mission)
     return mission_preview(
         MissionPicture(
@@ -46,7 +45,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             route=stops if mission.sorties is None else None,
             transits=_ways(mission),
             home=(float(home[0]), float(home[1])),
-            fence=np.column_stack([fence.lon_deg, fence.lat_deg]),
+            fence=_fence(mission),
             area=() if place.area is None else _rings(mission),
             keep_outs=_keep_outs(place),
             margins=_margins(place),
@@ -94,6 +93,21 @@ def _degrees(ground: Barred, lines: Iterable[BaseGeometry]) -> tuple[NDArray[np.
     return tuple(ground.plane.degrees(shapely.get_coordinates(line)) for line in lines)
 
 
+def _fence(mission: PlannedMission) -> NDArray[np.float64]:
+    """Return the corners of the fence; of sorties those of a hull round theirs."""
+    fences = [plan.fences[0] for plan in mission.plans]
+    corners = np.concatenate([np.column_stack([fence.lon_deg, fence.lat_deg]) for fence in fences])
+    if len(fences) == 1:
+        return corners
+    import shapely
+
+    west_deg = corners[0, 0]
+    corners[:, 0] = west_deg + (corners[:, 0] - west_deg + 180.0) % 360.0 - 180.0  # side by side at the antimeridian
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
+    hull[:, 0] = (hull[:, 0] + 180.0) % 360.0 - 180.0
+    return np.asarray(hull, dtype=np.float64)
+
+
 def _ways(mission: PlannedMission) -> tuple[NDArray[np.float64], ...]:
     """Return the ways from and to home; of sorties each whole flight."""
     if mission.sorties is None:
@@ -133,7 +147,7 @@ def _rings(mission: PlannedMission) -> tuple[NDArray[np.float64], ...]:
 
 
 def _caption(mission: PlannedMission) -> tuple[str, ...]:
-    found = mission.candidate
+    found = mission.measured
     return (
         f"{found.stops.size} stops, {mission.path_length_m / 1000:.1f} km over the stops "
         f"({mission.coverage_fraction:.1%} of full coverage), "

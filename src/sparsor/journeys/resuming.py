@@ -283,7 +283,7 @@ def _own_logs(resume: ResumeSection) -> tuple[Path, ...]:
 
 def _home(mission: FlownMission, spec: MissionSpecification) -> dict[str, Any]:
     """Return home as it was: where none was given it was the first stop, and the people stand there."""
-    return {} if spec.flight.home is not None else {"home": mission.home}
+    return {} if spec.flight.given_homes else {"home": mission.home}
 
 
 def _given(section: dict[str, Any] | None) -> dict[str, Any]:

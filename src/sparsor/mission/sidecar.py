@@ -61,6 +61,8 @@ class Sidecar:
         said of them, in a sidecar of an earlier version.
     flown : array of int64 (k,)
         Of a resumed mission: stops that earlier flights measured already, in their flight order.
+    heights_m : tuple of float
+        Above home, of vehicles at once that fly each at their own; `altitude_m` is the lowest of them.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Sidecar:
     passing: tuple[tuple[float, float], ...] = ()
     kept_out: NDArray[np.bool_] | None = None
     flown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    heights_m: tuple[float, ...] = ()
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -99,6 +102,8 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
     }
     if sidecar.passing:
         about["passing"] = [list(place) for place in sidecar.passing]
+    if sidecar.heights_m:
+        about["heights_m"] = list(sidecar.heights_m)
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
@@ -175,4 +180,5 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
         kept_out=None if kept_out is None else kept_out.astype(np.bool_),
         flown=flown,
+        heights_m=tuple(float(height_m) for height_m in about.get("heights_m", ())),
     )

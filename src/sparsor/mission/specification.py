@@ -170,9 +170,13 @@ class FlightSection(_Section):
     home_altitude_m: Annotated[FiniteFloat, Field(ge=-500, le=9000)] | None = None
     fence_margin_m: Annotated[FiniteFloat, Field(ge=5, le=5000)] = 50.0
     wind: tuple[FiniteFloat, FiniteFloat] | None = None
-    sorties: bool = False
+    sorties: bool = True
     keep_out: tuple[Path, ...] = ()
     keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
+    homes: tuple[tuple[Longitude, Latitude], ...] = ()
+    drop_unreachable: bool = False
+    vehicles: Annotated[int, Field(ge=1, le=8)] = 1
+    separation_m: Annotated[FiniteFloat, Field(ge=1, le=1000)] = 10.0
 
     @field_validator("wind")
     @classmethod
@@ -180,6 +184,32 @@ class FlightSection(_Section):
         if wind is not None:
             SteadyWind(*wind)
         return wind
+
+    @model_validator(mode="after")
+    def _homes_once(self) -> Self:
+        if self.homes and self.home is not None:
+            raise ValueError("give either one home or several homes, not both")
+        if len(set(self.homes)) < len(self.homes):
+            raise ValueError("two of the homes are the same place")
+        return self
+
+    @model_validator(mode="after")
+    def _cut_where_that_is_needed(self) -> Self:
+        if self.drop_unreachable and not self.sorties:
+            raise ValueError("--drop-unreachable goes with sorties: leave out --no-sorties (sorties = false)")
+        if self.vehicles > 1 and not self.sorties:
+            raise ValueError("--vehicles goes with sorties: leave out --no-sorties (sorties = false)")
+        if self.vehicles > 1 and len(self.given_homes) not in (0, 1, self.vehicles):
+            raise ValueError(
+                f"{self.vehicles} vehicles and {len(self.given_homes)} homes: give one home, beside which places are "
+                "looked for, or one for each vehicle"
+            )
+        return self
+
+    @property
+    def given_homes(self) -> tuple[tuple[float, float], ...]:
+        """The homes that were given; none where the route's first stop is to be home."""
+        return self.homes if self.home is None else (self.home,)
 
     @property
     def steady_wind(self) -> SteadyWind:
@@ -331,6 +361,9 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
         for name in ("planner", "iterations", *_ALGORITHM_1):
             search.pop(name, None)
     flight = merged["flight"]
+    for given, replaced in (("home", "homes"), ("homes", "home")):
+        if data.get("flight", {}).get(given):
+            flight.pop(replaced, None)
     if _without_none(data.get("flight", {})).get("vehicle", flight["vehicle"]) != flight["vehicle"]:
         for name, usual in (("altitude_m", (ALTITUDE_M, 0.0)), ("hold_s", (HOLD_S, 0.0))):
             if flight[name] in usual:  # it suited the vehicle of then

@@ -1,0 +1,49 @@
+"""Sorties as they are flown: every stop in one of them, none beyond the endurance less reserve, item by item."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sparsor.design import Candidate
+from sparsor.journeys.flights import Flights
+from sparsor.journeys.preparing import prepare
+from sparsor.journeys.sorties import Sorties, cut_into_sorties
+from sparsor.mission import Home, time_plan
+from sparsor.mission.specification import specification
+from sparsor.vehicle import usable_seconds
+
+BOX = (51.50, 25.27, 51.53, 25.30)
+
+
+@pytest.fixture(scope="module", params=["quad", "plane"])
+def prepared(request):
+    flight = {"vehicle": request.param, "wind": (5.0, 300.0), "drop_unreachable": True}
+    spec = specification({"name": "m", "area": {"bbox": BOX}, "flight": flight}, base=Path())
+    return spec, prepare(spec)
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 10_000), homes=st.integers(1, 2), hold_s=st.sampled_from([0.0, 90.0]))
+def test_no_sortie_is_beyond_the_endurance_and_every_stop_in_one(prepared, seed, homes, hold_s):
+    spec, ready = prepared
+    spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"hold_s": hold_s})})
+    rng = np.random.default_rng(seed)
+    stops = rng.permutation(1024)[: rng.integers(3, 16)]
+    places = rng.uniform((51.45, 25.22), (51.58, 25.35), (homes, 2))
+    route = Candidate(0, 0.0, 0.0, 0.0, 0.0, np.zeros((1, 1024), dtype=bool), stops, 0.0, 0)
+    flights = Flights(spec, ready, route, tuple(Home(*place) for place in places))
+    cut = cut_into_sorties(flights)
+    if isinstance(cut, str):
+        assert "nothing would be left" in cut
+        return
+    assert isinstance(cut, Sorties)
+    assert sorted(np.concatenate([*cut.orders, cut.dropped]).tolist()) == list(range(stops.size))
+    for plan, time in zip(cut.plans, cut.times, strict=True):
+        assert time == time_plan(plan, ready.vehicle, ready.wind)
+        assert time.used_s <= usable_seconds(ready.vehicle)
+        assert any(np.allclose((plan.home.lon_deg, plan.home.lat_deg), place, atol=1e-6) for place in places)
