@@ -194,7 +194,12 @@ def plan(
     ] = None,
     altitude: Annotated[
         float | None,
-        _option(FLIGHT, "Height above home, m (default: 50; 0 for rovers and boats).", "--altitude", metavar="M"),
+        _option(
+            FLIGHT,
+            "Height above home, or above the ground of --terrain, m (default: 50; 0 for rovers and boats).",
+            "--altitude",
+            metavar="M",
+        ),
     ] = None,
     speed: Annotated[
         float | None,
@@ -247,6 +252,24 @@ def plan(
     keep_out_margin: Annotated[
         float | None,
         _option(FLIGHT, "Least distance to a keep-out, m (default: 30).", "--keep-out-margin", metavar="M"),
+    ] = None,
+    terrain: Annotated[
+        Path | None,
+        _option(
+            FLIGHT,
+            "Elevation model (GeoTIFF): --altitude is kept above it along all legs. It knows no trees and buildings.",
+            "--terrain",
+            metavar="DEM.tif",
+        ),
+    ] = None,
+    terrain_tolerance: Annotated[
+        float | None,
+        _option(
+            FLIGHT,
+            "How much lower or higher a leg may be (default: a tenth of --altitude, 2 m at least).",
+            "--terrain-tolerance",
+            metavar="M",
+        ),
     ] = None,
     sensor_profile: Annotated[
         str | None,
@@ -311,6 +334,8 @@ def plan(
             "sorties": sorties or None,
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
+            "terrain": terrain,
+            "terrain_tolerance_m": terrain_tolerance,
         },
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
         "output": {"export": _formats(export)},

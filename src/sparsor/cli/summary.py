@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "theta": found.theta,
         "cost": found.cost,
         "incoherence": found.incoherence,
+        "terrain": None if mission.ground_facts is None else asdict(mission.ground_facts),
         "seed": spec.search.seed,
         "warnings": list(mission.warnings),
     }
@@ -81,6 +83,15 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
             f"{model.window_m[1] / 1000:.4g} km, {model.atoms} atoms",
         ),
     ]
+    if mission.ground_facts is not None:
+        over = mission.ground_facts
+        table.append(
+            (
+                "over the ground",
+                f"{over.least_m:.0f} to {over.most_m:.0f} m, {over.lowest_m:.0f} to {over.highest_m:.0f} m above home, "
+                f"by {over.passed} waypoints beside the stops ({over.file})",
+            )
+        )
     if mission.sensor is not None:
         table.append(("sensor", mission.sensor.words))
     if details and spec.search.planner == "monte-carlo":

@@ -125,6 +125,12 @@ def _holds(sidecar: Sidecar) -> str:
     return f"{sidecar.hold_s:g} s {each}"
 
 
+def _above(sidecar: Sidecar) -> str:
+    if not sidecar.above_ground:
+        return "home"
+    return f"the ground, {sidecar.way[:, 2].min():g} to {sidecar.way[:, 2].max():g} m above home"
+
+
 def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
     box = sidecar.grid.box
     known = "" if sidecar.home_altitude_known else " (unknown, written as 0)"
@@ -132,7 +138,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         f"{path}: the sidecar of mission '{sidecar.name}'",
         f"Box: {' '.join(f'{side:g}' for side in box.as_tuple())} (west south east north), "
         f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside.",
-        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {_holds(sidecar)}.",
+        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above {_above(sidecar)}, {_holds(sidecar)}.",
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
         f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast (|s - s'| / |s - mean(s)|).",
         *(() if sidecar.sensor is None else (f"Sensor: {sidecar.sensor.words}.",)),
@@ -143,6 +149,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         "bbox": list(box.as_tuple()),
         "stops": int(sidecar.stops.size),
         "altitude_m": sidecar.altitude_m,
+        "above_ground": sidecar.above_ground,
         "hold_s": sidecar.hold_s,
         "home": list(sidecar.home),
         "home_altitude_known": sidecar.home_altitude_known,

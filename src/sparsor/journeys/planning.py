@@ -9,12 +9,13 @@ import numpy as np
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
-from sparsor.design import Weights
+from sparsor.design import Weights, parse_budget
 from sparsor.design.expectation import expected_errors
 from sparsor.errors import MissionError
 from sparsor.geodesy.lengths import distance_m, path_length_m
 from sparsor.journeys.advice import advice
 from sparsor.journeys.algorithm1 import search_algorithm_1
+from sparsor.journeys.groundwork import GroundFacts, check_over, ground_facts, said_of_ground
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from sparsor.design import Candidate
     from sparsor.journeys.modelling import PriorChoice
+    from sparsor.mission.following import Ground
     from sparsor.mission.specification import MissionSpecification
 
 _STRAIGHT = (
@@ -71,6 +73,9 @@ class PlannedMission:
     sorties : Sorties or None
         The flights that the route is cut into, where one is not enough and they were asked for; length, times and
         errors above are of the uncut route.
+    ground : Ground or None
+        That heights are kept above.
+    ground_facts : GroundFacts or None
     """
 
     specification: MissionSpecification
@@ -90,6 +95,8 @@ class PlannedMission:
     expected_relative_error_cells: float
     warnings: tuple[str, ...]
     sorties: Sorties | None = None
+    ground: Ground | None = None
+    ground_facts: GroundFacts | None = None
 
     @property
     def usable_s(self) -> float:
@@ -190,7 +197,8 @@ def _assemble(
     flight, stops = spec.flight, candidate.stops
     lon, lat = place.grid.centres_deg(stops)
     holds_s = np.broadcast_to(_holds_s(flight.hold_s, candidate, prepared.autopilot), stops.shape)
-    home = _home(spec, float(lon[0]), float(lat[0]))
+    ground = prepared.ground
+    home = _home(spec, float(lon[0]), float(lat[0]), ground)
 
     def build(order: NDArray[np.int64]) -> MissionPlan:
         return build_mission(
@@ -205,6 +213,7 @@ def _assemble(
             fence_margin_m=flight.fence_margin_m,
             wind=prepared.wind,
             zones=place.zones,
+            ground=ground,
         )
 
     plan = build(np.arange(stops.size))
@@ -237,6 +246,12 @@ def _assemble(
             mission = replace(mission, sorties=cut)
             warnings = (*warnings, _said_of(cut, mission))
     _check(mission, prepared.wind)
+    if ground is not None:
+        check_over(mission.plans, ground, vehicle)
+        facts = ground_facts(mission.plans, ground, vehicle)
+        mission = replace(mission, ground=ground, ground_facts=facts)
+        warnings = (*warnings, *said_of_ground(facts, plan, ground, vehicle, flight.home_altitude_m))
+        warnings = (*warnings, *_beyond_budget(mission))
     said = (*warnings, *advice(mission), *plan.warnings, *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
@@ -280,7 +295,21 @@ def _holds_s(hold_s: float, candidate: Candidate, autopilot: Autopilot) -> Array
     return hold_s if candidate.dwells is None else autopilot.written_hold_s(hold_s) * candidate.dwells
 
 
-def _home(spec: MissionSpecification, first_lon: float, first_lat: float) -> Home:
+def _beyond_budget(mission: PlannedMission) -> tuple[str, ...]:
+    """Say it where the climbs over terrain, which the search does not know, take more than a budget of time."""
+    asked = mission.specification.search.budget
+    budget = None if asked is None else parse_budget(asked)
+    if budget is None or budget.measure != "time" or mission.flight_time_s <= budget.value:
+        return ()
+    return (
+        "Climbing and sinking over the ground take longer than the search counted: "
+        f"{mission.flight_time_s / 60:.1f} min, beyond {budget.value / 60:g} min: give a smaller --budget.",
+    )
+
+
+def _home(spec: MissionSpecification, first_lon: float, first_lat: float, ground: Ground | None) -> Home:
     lon, lat = spec.flight.home or (first_lon, first_lat)
     altitude = spec.flight.home_altitude_m
+    if altitude is None and ground is not None:
+        altitude = round(ground.home_m((lon, lat)), 1)
     return Home(lon, lat, altitude or 0.0, altitude_known=altitude is not None)

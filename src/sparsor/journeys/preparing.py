@@ -13,6 +13,7 @@ from sparsor.design.sparsity import check_sparsity
 from sparsor.errors import MissionError
 from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
+from sparsor.journeys.groundwork import mission_ground
 from sparsor.journeys.keepingout import barred_legs, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
     from sparsor.core.workers import Workers
     from sparsor.geodesy.zones import Zones
+    from sparsor.mission.following import Ground
     from sparsor.mission.specification import MissionSpecification
 
 
@@ -67,6 +69,8 @@ class Prepared:
     speed_m_s : float
         Along legs.
     wind : SteadyWind
+    ground : Ground or None
+        That heights are kept above.
     """
 
     place: Place
@@ -77,6 +81,7 @@ class Prepared:
     sensor: SensorProfile | None
     speed_m_s: float
     wind: SteadyWind = CALM
+    ground: Ground | None = None
 
     def hold(self, spec: MissionSpecification) -> tuple[float, float]:
         """Return one hold at a stop, as it is written, and the braking that goes with it, both seconds."""
@@ -141,13 +146,15 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     vehicle = load_vehicle(spec.flight.vehicle)
     autopilot, sensor = autopilot_named(spec.flight.autopilot), _sensor(spec)
     box, area = _where(spec)
+    ground = mission_ground(spec, box, vehicle)
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
     grid = Grid(box, prior.model.shape)
     place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot))
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
     wind = spec.flight.steady_wind
     check_wind(vehicle, wind, speed)
-    return Prepared(place, prior, _legs(place, vehicle, speed, wind), vehicle, autopilot, sensor, speed, wind)
+    legs = _legs(place, vehicle, speed, wind)
+    return Prepared(place, prior, legs, vehicle, autopilot, sensor, speed, wind, ground)
 
 
 def _sensor(spec: MissionSpecification) -> SensorProfile | None:

@@ -175,6 +175,7 @@ def reconstruct(
         value=readings.value,
         stops=mission.stops,
         altitude_m=mission.altitude_m,
+        way=mission.way,
     )
     progress("decoding", 0, 1)
     decoded = decode(

@@ -37,9 +37,10 @@ def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
     return tuple(fault.sentence for fault in judged_faults(plan))
 
 
-def judged_faults(plan: MissionPlan) -> tuple[Fault, ...]:
-    """Return each fault noticed, with whether it is serious."""
-    return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *fence_faults(plan))
+def judged_faults(plan: MissionPlan, *, over_terrain: bool = False) -> tuple[Fault, ...]:
+    """Return each fault noticed; of a plan whose heights are checked against the ground none of those above home."""
+    heights = () if over_terrain else _heights(plan)
+    return (*_order(plan), *_positions(plan), *heights, *_limits(plan), *_frames(plan), *fence_faults(plan))
 
 
 def _order(plan: MissionPlan) -> Iterator[Fault]:
@@ -92,6 +93,10 @@ def _positions(plan: MissionPlan) -> Iterator[Fault]:
                 f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'.",
                 serious=item.command not in POSITION_OPTIONAL,
             )
+
+
+def _heights(plan: MissionPlan) -> Iterator[Fault]:
+    for place, item in enumerate(plan.items, start=1):
         flies = plan.vehicle_type not in STAYS_DOWN
         if flies and item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
             yield Fault(f"Item {place} is a waypoint {item.altitude_m:g} m above home.")

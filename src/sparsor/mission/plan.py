@@ -138,8 +138,8 @@ class MissionPlan:
     complex_items : tuple of ComplexItem
         Patterns found in a plan that was read.
     passing : tuple of int
-        Indices of the waypoints that only lead past a keep-out and are no stops, as far as that is known; no part of
-        equality, a .plan does not say.
+        Indices of the waypoints that only lead past a keep-out or over terrain and are no stops, as far as that is
+        known; no part of equality, a .plan does not say.
     warnings : tuple of str
         Sentences about this plan, from making or from reading it; no part of equality.
     """
@@ -183,6 +183,15 @@ class MissionPlan:
         return tuple(self.items[index] for index in stops if index not in self.passing)
 
 
+def flown_way(plan: MissionPlan) -> list[tuple[float, float, float]]:
+    """Return longitude, latitude and height above home of the survey and the ways to and from it, in order.
+
+    Of a plan of ours: all waypoints, which are above home.
+    """
+    at_height = WAYPOINTS | {NAV_LOITER_TIME}
+    return [(item.lon_deg, item.lat_deg, item.altitude_m) for item in plan.items if item.command in at_height]
+
+
 def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """Return the longitudes and latitudes of the ways from home to the first stop and from the last one home.
 
@@ -190,10 +199,12 @@ def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[f
     """
     home, stops = (plan.home.lon_deg, plan.home.lat_deg), plan.stops
     first, last = ((stop.lon_deg, stop.lat_deg) for stop in (stops[0], stops[-1]))
-    begin = next(index for index, item in enumerate(plan.items) if item is stops[0])
+    begin, end = (
+        next(index for index, item in enumerate(plan.items) if item is stop) for stop in (stops[0], stops[-1])
+    )
     passed = [(index, (plan.items[index].lon_deg, plan.items[index].lat_deg)) for index in plan.passing]
     out = [place for index, place in passed if index < begin]
-    back = [place for index, place in passed if index > begin]
+    back = [place for index, place in passed if index > end]
     return [home, *out, first], [last, *back, home]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +41,7 @@ class Sidecar:
     stops : array of int64 (n,)
         Planned cells in flight order.
     altitude_m, hold_s : float
-        Height above home and the longest dwell time at a stop.
+        Height above home, or above the ground, and the longest dwell time at a stop.
     home : tuple of float
         Longitude, latitude (degrees) and altitude above mean sea level (m) of home.
     home_altitude_known : bool
@@ -55,7 +55,12 @@ class Sidecar:
     sensor : SensorProfile or None
         What will measure, when that was said.
     passing : tuple of (longitude, latitude)
-        Waypoints that only lead past a keep-out and are no stops.
+        Waypoints that only lead past a keep-out or over terrain and are no stops.
+    above_ground : bool
+        Whether `altitude_m` is above the ground, which `way` then follows.
+    way : array of float64 (n, 3)
+        Longitude, latitude (degrees) and height above home (m) of what is flown, where the height is not the same
+        everywhere; else empty.
     """
 
     name: str
@@ -73,6 +78,8 @@ class Sidecar:
     plans: Mapping[str, str]
     sensor: SensorProfile | None = None
     passing: tuple[tuple[float, float], ...] = ()
+    above_ground: bool = False
+    way: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -92,6 +99,9 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
     }
     if sidecar.passing:
         about["passing"] = [list(place) for place in sidecar.passing]
+    if sidecar.above_ground:
+        about["above_ground"] = True
+        about["way"] = sidecar.way.tolist()
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
@@ -160,4 +170,6 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         plans={str(key): str(value) for key, value in about["plans"].items()},
         sensor=SensorProfile.from_mapping(about["sensor"], "its sensor") if "sensor" in about else None,
         passing=tuple((float(lon), float(lat)) for lon, lat in about.get("passing", ())),
+        above_ground=bool(about.get("above_ground", False)),
+        way=np.array(about.get("way", []), dtype=np.float64).reshape(-1, 3),
     )

@@ -173,6 +173,8 @@ class FlightSection(_Section):
     sorties: bool = False
     keep_out: tuple[Path, ...] = ()
     keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
+    terrain: Path | None = None
+    terrain_tolerance_m: Annotated[FiniteFloat, Field(gt=0, le=1000)] | None = None
 
     @field_validator("wind")
     @classmethod
@@ -180,6 +182,17 @@ class FlightSection(_Section):
         if wind is not None:
             SteadyWind(*wind)
         return wind
+
+    @model_validator(mode="after")
+    def _tolerance_of_a_terrain(self) -> Self:
+        if self.terrain_tolerance_m is not None and self.terrain is None:
+            raise ValueError("--terrain-tolerance only makes sense with --terrain")
+        if self.terrain_tolerance_m is not None and self.terrain_tolerance_m >= self.altitude_m:
+            raise ValueError(
+                f"a terrain tolerance of {self.terrain_tolerance_m:g} m for a flight {self.altitude_m:g} m above the "
+                "ground; it has to be below the height"
+            )
+        return self
 
     @property
     def steady_wind(self) -> SteadyWind:
@@ -222,7 +235,14 @@ class MissionSpecification(_Section):
         """The files that this mission is made from."""
         sensor = None if self.sensor is None else self.sensor.profile
         profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
-        paths = (self.area.file, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
+        paths = (
+            self.area.file,
+            self.prior.field,
+            self.prior.model,
+            self.flight.terrain,
+            *self.flight.keep_out,
+            *profiles,
+        )
         return tuple(path for path in paths if path is not None)
 
     @field_validator("name")
@@ -346,7 +366,7 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     flight = spec.flight
     if flight.vehicle.endswith(".toml"):
         flight = flight.model_copy(update={"vehicle": change(Path(flight.vehicle)).as_posix()})
-    flight = flight.model_copy(update={"keep_out": tuple(change(path) for path in flight.keep_out)})
+    flight = moved(flight.model_copy(update={"keep_out": tuple(change(path) for path in flight.keep_out)}), "terrain")
     sensor = spec.sensor
     if sensor is not None and sensor.profile is not None and sensor.profile.endswith(".toml"):
         sensor = sensor.model_copy(update={"profile": change(Path(sensor.profile)).as_posix()})
