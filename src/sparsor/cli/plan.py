@@ -271,6 +271,17 @@ def plan(
             metavar="M",
         ),
     ] = None,
+    trigger: Annotated[
+        list[str] | None,
+        _option(
+            FLIGHT,
+            "Switched on at each stop that is dwelt at and off after it: servo:CHANNEL:PWM_ON:PWM_OFF, relay:NUMBER, "
+            "message:ID (to a script; these ArduPilot only); camera-distance:METRES from the first stop to the last. "
+            "Repeatable.",
+            "--trigger",
+            metavar="WHAT",
+        ),
+    ] = None,
     sensor_profile: Annotated[
         str | None,
         _option(
@@ -335,6 +346,7 @@ def plan(
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
             "terrain": terrain,
+            "trigger": tuple(trigger) if trigger else None,
             "terrain_tolerance_m": terrain_tolerance,
         },
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,

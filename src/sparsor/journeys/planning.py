@@ -214,6 +214,7 @@ def _assemble(
             wind=prepared.wind,
             zones=place.zones,
             ground=ground,
+            triggers=flight.triggers,
         )
 
     plan = build(np.arange(stops.size))

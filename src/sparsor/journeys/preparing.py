@@ -18,6 +18,7 @@ from sparsor.journeys.keepingout import barred_legs, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior
 from sparsor.mission.specification import PAPER_ROWS
+from sparsor.mission.triggers import check_triggers
 from sparsor.vehicle import (
     CALM,
     Autopilot,
@@ -145,6 +146,7 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     """
     vehicle = load_vehicle(spec.flight.vehicle)
     autopilot, sensor = autopilot_named(spec.flight.autopilot), _sensor(spec)
+    check_triggers(spec.flight.triggers, autopilot)
     box, area = _where(spec)
     ground = mission_ground(spec, box, vehicle)
     prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)

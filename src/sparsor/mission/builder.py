@@ -17,14 +17,17 @@ from sparsor.mission.layout import lay_out
 from sparsor.mission.plan import Home, MissionPlan, RallyPoint
 from sparsor.mission.sequences import BESIDE_STOPS, Visit, flight_items
 from sparsor.mission.timing import time_plan
+from sparsor.mission.triggers import CAMERA, check_triggers
 from sparsor.vehicle import CALM, Autopilot, SteadyWind, Vehicle, autopilot_named, check_wind
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.geodesy.zones import Zones
     from sparsor.mission.following import Ground
-    from sparsor.mission.layout import Layout
+    from sparsor.mission.triggers import Trigger
 
 # An autopilot stores positions as integers of 1e-7 degrees: what is written is what is flown.
 DECIMALS = 7
@@ -46,6 +49,7 @@ def build_mission(
     wind: SteadyWind = CALM,
     zones: Zones | None = None,
     ground: Ground | None = None,
+    triggers: Sequence[Trigger] = (),
 ) -> MissionPlan:
     """Turn a route into a plan that its kind of vehicle flies from take-off to landing.
 
@@ -76,6 +80,8 @@ def build_mission(
         between stops are the caller's.
     ground : Ground, optional
         What heights are kept above, at the stops and along every leg, by further waypoints where it takes them.
+    triggers : sequence of Trigger
+        What is switched on at each stop that is waited at, and off after it.
 
     Returns
     -------
@@ -97,8 +103,14 @@ def build_mission(
     check_wind(vehicle, wind, speed)
     if ground is not None and not vehicle.flies:
         raise MissionError(f"a {vehicle.kind} stays on the ground: leave --terrain out")
-    altitude = _checked_altitude(altitude_m if ground is None else ground.height_m, vehicle)
     holds = _checked_holds(hold_s, lon.size, facts)
+    check_triggers(triggers, facts)
+    if any(one.kind != CAMERA for one in triggers) and not any(holds):
+        raise MissionError(
+            "no stop is waited at, so there is none to switch a trigger on at: give --hold with --planner monte-carlo, "
+            "or leave --trigger out"
+        )
+    altitude = _checked_altitude(altitude_m if ground is None else ground.height_m, vehicle)
 
     base = (home.lon_deg, home.lat_deg)
     layout = lay_out(
@@ -114,7 +126,6 @@ def build_mission(
         zones=zones,
         ground=ground,
     )
-    _check_count(layout, facts, vehicle)
     items, passing = flight_items(
         layout.visits,
         base,
@@ -123,7 +134,9 @@ def build_mission(
         ascent=layout.ascent,
         speed_m_s=speed,
         ends=layout.ends,
+        triggers=triggers,
     )
+    _check_count(lon.size, len(items), facts, vehicle)
     path_lon, path_lat = np.array(layout.path).T
     fence_margin_m += 2.0 * vehicle.turn_radius_m if vehicle.circles else 0.0
     fence = fence_around(path_lon, path_lat, fence_margin_m, min(MAX_CORNERS, facts.max_fence_points))
@@ -209,14 +222,13 @@ def _checked_holds(hold_s: ArrayLike, stops: int, autopilot: Autopilot) -> list[
     return [autopilot.written_hold_s(float(hold)) for hold in np.broadcast_to(given, (stops,))]
 
 
-def _check_count(layout: Layout, autopilot: Autopilot, vehicle: Vehicle) -> None:
-    most, visits = max_stops(autopilot, vehicle.kind), len(layout.visits)
-    if visits <= most:
+def _check_count(stops: int, items: int, autopilot: Autopilot, vehicle: Vehicle) -> None:
+    if items + int(autopilot.home_is_item_0) <= autopilot.max_items:
         return
-    passed = sum(not visit.stop for visit in layout.visits)
-    also = f", and {passed} waypoints between them," if passed else ""
-    eased = "; a larger --terrain-tolerance needs fewer of those" if passed else ""
+    beside = items - stops - BESIDE_STOPS[vehicle.kind]
+    also = f", with {beside} items beside them (past keep-outs, over terrain, triggers)," if beside else ""
+    eased = "; a larger --terrain-tolerance needs fewer of those" if beside else ""
     raise MissionError(
-        f"{visits - passed} stops{also} are too many for one mission: {autopilot.title} stores {autopilot.max_items} "
-        f"items, which leaves {most} stops; plan fewer or split the area{eased}"
+        f"{stops} stops{also} are too many for one mission: {autopilot.title} stores {autopilot.max_items} items, "
+        f"which leaves {max_stops(autopilot, vehicle.kind)} stops; plan fewer or split the area{eased}"
     )

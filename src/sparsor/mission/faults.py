@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from sparsor.mission.fault import Fault
 from sparsor.mission.fencefaults import fence_faults
 from sparsor.mission.items import (
+    ARDUPILOT_ONLY,
     DO_CHANGE_SPEED,
     DO_LAND_START,
     FLOWN_TO,
@@ -133,5 +134,7 @@ def _frames(plan: MissionPlan) -> Iterator[Fault]:
             yield Fault(
                 f"Item {place} (command {item.command}) is in frame {item.frame}; PX4 takes only frame 2.", True
             )
+        elif item.command in ARDUPILOT_ONLY:
+            yield Fault(f"Item {place} (command {item.command}) is one that PX4 refuses in a mission.", True)
         elif item.frame == FRAME_TERRAIN:
             yield Fault(f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses.", True)

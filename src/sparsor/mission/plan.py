@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from sparsor.errors import MissionError
-from sparsor.mission.items import LANDINGS, NAV_LOITER_TIME, WAYPOINTS
+from sparsor.mission.items import FLOWN_TO, LANDINGS, NAV_LOITER_TIME, WAYPOINTS
 from sparsor.vehicle import AUTOPILOTS
 
 if TYPE_CHECKING:
@@ -170,7 +170,11 @@ class MissionPlan:
     @property
     def stops(self) -> tuple[MissionItem, ...]:
         """Waypoints and timed circles of the survey: all but the waypoint over the landing place, or back at home."""
-        stops = [index for index, item in enumerate(self.items) if item.command in WAYPOINTS | {NAV_LOITER_TIME}]
+        stops = [
+            index
+            for index, item in enumerate(self.items)
+            if item.command in WAYPOINTS | {NAV_LOITER_TIME} and not self._only_arrives(index)
+        ]
         if len(stops) > 1 or (stops and stops[-1] + 1 < len(self.items)):
             last = self.items[stops[-1]].params[4:6]
             after = self.items[stops[-1] + 1] if stops[-1] + 1 < len(self.items) else None
@@ -181,6 +185,15 @@ class MissionPlan:
             if landed or parked:
                 stops.pop()
         return tuple(self.items[index] for index in stops if index not in self.passing)
+
+    def _only_arrives(self, index: int) -> bool:
+        """Whether a waypoint arrives where the next item waits: between the two something is switched on."""
+        item = self.items[index]
+        if item.hold_s > 0 or index in self.passing:
+            return False
+        after = next((one for one in self.items[index + 1 :] if one.command in FLOWN_TO), None)
+        waits = after is not None and after.command in WAYPOINTS | {NAV_LOITER_TIME} and after.hold_s > 0
+        return waits and after is not None and after.params[4:6] == item.params[4:6]
 
 
 def flown_way(plan: MissionPlan) -> list[tuple[float, float, float]]:

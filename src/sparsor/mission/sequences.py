@@ -6,7 +6,7 @@ docs/mission-items.md has the tables.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +25,14 @@ from sparsor.mission.items import (
     take_off,
     waypoint,
 )
+from sparsor.mission.triggers import CAMERA
 from sparsor.vehicle import approach_m, climb_out_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sparsor.mission.items import MissionItem
+    from sparsor.mission.triggers import Trigger
     from sparsor.vehicle import Autopilot, SteadyWind, Vehicle
 
 Point = tuple[float, float]
@@ -115,6 +117,7 @@ def flight_items(
     ascent: Ascent,
     speed_m_s: float,
     ends: Ends | None = None,
+    triggers: Sequence[Trigger] = (),
 ) -> tuple[tuple[MissionItem, ...], tuple[int, ...]]:
     """Return the items of a flight, and the indices of those that are only passed.
 
@@ -129,6 +132,8 @@ def flight_items(
     speed_m_s : float
     ends : Ends, optional
         Of what circles, see `ends_of`.
+    triggers : sequence of Trigger
+        Switched on and off at the stops that are waited at; a camera after the first stop and after the last.
     """
     radius_m = vehicle.acceptance_radius_m
     if not autopilot.waypoint_radius:
@@ -145,10 +150,21 @@ def flight_items(
     over_home = () if vehicle.circles else (visited(Visit(*home, ascent.home_m, stop=False)),)
     survey: list[MissionItem] = []
     passing: list[int] = []
+    switched = [one for one in triggers if one.kind != CAMERA]
+    along = [one for one in triggers if one.kind == CAMERA]
+    stop, last = 0, sum(visit.stop for visit in visits)
     for visit in visits:
+        stop += visit.stop
         if not visit.stop:
             passing.append(len(before) + 1 + len(survey))
-        survey.append(visited(visit))
+        if switched and visit.stop and visit.hold_s > 0:
+            arrival = visited(replace(visit, hold_s=0.0))
+            survey += [arrival, *(one.item(on=True, stop=stop) for one in switched)]
+            survey += [visited(visit), *(one.item(on=False, stop=stop) for one in switched)]
+        else:
+            survey.append(visited(visit))
+        if visit.stop and stop in (1, last):
+            survey += [one.item(on=stop < last, stop=stop) for one in along]
     return (*before, speed, *survey, *over_home, *after), tuple(passing)
 
 

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from sparsor.errors import MissionError, VehicleError
+from sparsor.mission.triggers import Trigger, parse_trigger
 from sparsor.vehicle import CALM, SteadyWind, load_vehicle
 
 if TYPE_CHECKING:
@@ -175,6 +176,7 @@ class FlightSection(_Section):
     keep_out_margin_m: Annotated[FiniteFloat, Field(ge=1, le=10_000)] = 30.0
     terrain: Path | None = None
     terrain_tolerance_m: Annotated[FiniteFloat, Field(gt=0, le=1000)] | None = None
+    trigger: tuple[str, ...] | None = None
 
     @field_validator("wind")
     @classmethod
@@ -182,6 +184,18 @@ class FlightSection(_Section):
         if wind is not None:
             SteadyWind(*wind)
         return wind
+
+    @field_validator("trigger")
+    @classmethod
+    def _can_be_switched(cls, trigger: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        for one in trigger or ():
+            parse_trigger(one)
+        return trigger
+
+    @property
+    def triggers(self) -> tuple[Trigger, ...]:
+        """What is switched at the stops."""
+        return tuple(parse_trigger(one) for one in self.trigger or ())
 
     @model_validator(mode="after")
     def _tolerance_of_a_terrain(self) -> Self:

@@ -200,6 +200,8 @@ class Navigator:
         following = self.target(after)
         if following is None or self.items[after].command != NAV_WAYPOINT:
             return 0.0
+        if math.dist(following[:2], target[:2]) < HEIGHT_M:  # it waits in the same place
+            return 0.0
         course = math.atan2(target[0] - motion.east_m, target[1] - motion.north_m)
         turn = math.atan2(following[0] - target[0], following[1] - target[1]) - course
         if abs((turn + math.pi) % (2 * math.pi) - math.pi) < STRAIGHT_RAD:
