@@ -211,13 +211,14 @@ def plan(
         ),
     ] = None,
     hold: Annotated[
-        float | None,
+        str | None,
         _option(
             FLIGHT,
-            "Dwell time at each stop of Algorithm 1; one dwell of the refined search, which places as many as pay, s "
-            "(default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
+            "Dwell time at each stop of Algorithm 1, s, or auto: until the sensor (--t90, --sensor-profile) shows 95 % "
+            "of a step; one dwell of the refined search, which places as many as pay by itself (default: 5; planes and "
+            "VTOLs: 0, flown through, and circles otherwise).",
             "--hold",
-            metavar="S",
+            metavar="S|auto",
         ),
     ] = None,
     home: Annotated[
@@ -338,7 +339,7 @@ def plan(
             "autopilot": autopilot,
             "altitude_m": altitude,
             "speed_m_s": speed,
-            "hold_s": hold,
+            "hold_s": _number(hold),
             "home": home,
             "home_altitude_m": home_altitude,
             "wind": wind,
@@ -420,6 +421,14 @@ def _as_typed(message: str) -> str:
     message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)
+
+
+def _number(text: str | None) -> float | str | None:
+    """Return a number where there is one; what else was typed is judged with the rest."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _cleaned(name: str) -> str:

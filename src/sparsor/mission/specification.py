@@ -21,7 +21,7 @@ from pydantic import (
 
 from sparsor.errors import MissionError, VehicleError
 from sparsor.mission.triggers import Trigger, parse_trigger
-from sparsor.vehicle import CALM, SteadyWind, load_vehicle
+from sparsor.vehicle import CALM, SteadyWind, load_sensor, load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,6 +37,7 @@ PAPER_ROWS, PAPER_PROBABILITY, PAPER_THETA = 35, 0.03, 3
 ALGORITHM_1_ITERATIONS = 4000
 DEFAULT_BUDGET = "10%"
 ALTITUDE_M, HOLD_S = 50.0, 5.0
+AUTO = "auto"  # a hold that follows the sensor; a number once it is known
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 # Settings that only Algorithm 1 knows: who gives one asks for it.
 _ALGORITHM_1 = frozenset(
@@ -282,12 +283,31 @@ def specification(data: dict[str, Any], *, base: Path) -> MissionSpecification:
     MissionError
         Names each key that is wrong, its value and what is allowed.
     """
+    by_the_sensor = (data.get("flight") or {}).get("hold_s") == AUTO
+    if by_the_sensor:
+        data = {**data, "flight": {**data["flight"], "hold_s": 0.0}}
     try:
         spec = MissionSpecification.model_validate(_without_none(data))
     except ValidationError as error:
         raise MissionError(_explain(error)) from None
     spec = _with_paths(spec, lambda path: Path(os.path.normpath(base / path)))
+    if by_the_sensor:
+        spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"hold_s": _dwell_s(spec)})})
     return _as_its_vehicle_moves(spec, data.get("flight") or {})
+
+
+def _dwell_s(spec: MissionSpecification) -> float:
+    """Return how long a stop of Algorithm 1 is dwelt at so that its sensor answers to 95 %, seconds."""
+    if spec.search.planner == "refined":
+        raise MissionError(
+            "--hold auto is of Algorithm 1 (--planner monte-carlo): the refined planner places its dwells by the "
+            "sensor's response already, and --hold is the length of one; give seconds, or leave it out"
+        )
+    if spec.sensor is None:
+        raise MissionError("--hold auto follows the sensor's response: say which one with --t90 or --sensor-profile")
+    if spec.sensor.profile is not None:
+        return load_sensor(spec.sensor.profile).dwell_s
+    return load_sensor().model_copy(update={"t90_s": spec.sensor.t90_s}).dwell_s
 
 
 def _as_its_vehicle_moves(spec: MissionSpecification, given: Mapping[str, object]) -> MissionSpecification:
