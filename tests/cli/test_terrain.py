@@ -25,8 +25,7 @@ def dem(tmp_path: Path) -> Path:
     [
         (),
         ("--planner", "monte-carlo", "--autopilot", "px4", "--hold", 3, "--terrain-tolerance", 8),
-        ("--vehicle", "vtol", "--altitude", 70, "--home", 51.515, 25.285),
-        ("--vehicle", "plane", "--altitude", 70, "--budget", "6km", "--wind", 4, 320),
+        ("--vehicle", "plane", "--altitude", 70, "--budget", "6km", "--wind", 4, 320, "--home-altitude", 300),
     ],
 )
 def test_the_plan_the_sidecar_and_the_check_follow_the_ground(console, dem, tmp_path, options):
@@ -36,7 +35,11 @@ def test_the_plan_the_sidecar_and_the_check_follow_the_ground(console, dem, tmp_
     tolerance_m = 8 if "--terrain-tolerance" in options else height_m / 10
     plan = read_plan(Path(ran.result["plans"][0]))
     home_m = float(HILLS.at(plan.home.lon_deg, plan.home.lat_deg))
-    assert plan.home.alt_amsl_m == pytest.approx(home_m, abs=0.06)
+    said = " ".join(ran.result["warnings"])
+    if 300 in options:
+        assert "--home-altitude is 300 m" in said
+    else:
+        assert plan.home.alt_amsl_m == pytest.approx(home_m, abs=0.06)
     for stop in plan.stops:
         above = stop.altitude_m + home_m - float(HILLS.at(stop.lon_deg, stop.lat_deg))
         assert above >= height_m - tolerance_m - 0.05
@@ -44,7 +47,6 @@ def test_the_plan_the_sidecar_and_the_check_follow_the_ground(console, dem, tmp_
     assert over["least_m"] >= height_m - tolerance_m - 0.05
     assert over["file"] == "dem.tif"
     assert over["lowest_m"] < over["highest_m"]
-    said = " ".join(ran.result["warnings"])
     assert "Trees, buildings and wires are not in such a model" in said
     assert "failsafe return flies straight home" in said
     assert f"{plan.rally_points[0].altitude_m:g} m or more" in said
@@ -56,6 +58,8 @@ def test_the_plan_the_sidecar_and_the_check_follow_the_ground(console, dem, tmp_
     checked = console("sparsor", "check", folder, "--json")
     assert checked.code == 0, checked.out
     assert not [one for one in checked.result["warnings"] if "common ceiling" in one]
+    if "px4" not in options:
+        return
     before = (folder / "m.plan").read_bytes()
     again = console("generate-mission", folder / "mission.toml", "--json")
     assert again.code == 0, again.err
@@ -118,6 +122,26 @@ def test_what_cannot_be_followed_is_refused(console, tmp_path, options, words):
     assert not (tmp_path / "missions").exists()
 
 
-def test_a_home_at_another_height_is_told(console, dem):
-    ran = console.mission("--name", "m", "--terrain", dem, "--home-altitude", 300, "--budget", "6km", "--json")
-    assert any("--home-altitude is 300 m" in one for one in ran.result["warnings"])
+def test_sorties_follow_the_ground_too(console, dem, tmp_path):
+    ran = console.mission(
+        "--name", "m", "--terrain", dem, "--budget", "22km", "--sorties", "--json", "--home", 51.504, 25.2815,
+        iterations=100,
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert ran.result["sorties"] > 1
+    assert ran.result["terrain"]["least_m"] >= 45 - 0.05
+    assert console("sparsor", "check", tmp_path / "missions/m").code == 0
+    sidecar = read_sidecar(tmp_path / "missions/m/m.npz")
+    waypoints = [item for path in ran.result["plans"] for item in read_plan(Path(path)).items if item.command == 16]
+    assert len(sidecar.way) == len(waypoints)
+
+
+def test_what_the_climbs_take_beyond_a_budget_of_time_is_told(console, tmp_path):
+    steep = write_dem(tmp_path / "steep.tif", hills(8, height_m=220.0))
+    words = ("--terrain", steep, "--altitude", 130, "--budget", "14min", "--json")
+    ran = console.mission("--name", "m", *words, iterations=100)
+    assert ran.code == 0, ran.err
+    assert ran.result["flight_time_s"] > 14 * 60
+    assert any("Climbing and sinking over the ground take longer" in one for one in ran.result["warnings"])
+    said = [one for one in ran.result["warnings"] if "the ceiling of 120 m" in one]
+    assert ["m above the ground, beyond" in one for one in said] == [True] * 2
