@@ -27,6 +27,10 @@ class AreaError(InputError):
     """An area file that cannot be read or holds no usable polygon."""
 
 
+class TerrainError(InputError):
+    """An elevation model that cannot be read, or that does not know the ground under what is flown."""
+
+
 class FieldError(InputError):
     """A field of training values that cannot be read or used."""
 

@@ -58,6 +58,7 @@ def test_boxes(console, tree, box, said):
         ("--altitude 30000", ("--altitude", "30000", "less than or equal to 20000")),
         ("--speed 0", ("--speed", "0.0", "greater than 0")),
         ("--hold -1", ("--hold", "-1.0", "greater than or equal to 0")),
+        ("--hold long", ("--hold", "valid number", "long")),
         ("--autopilot inav", ("autopilot", "'inav'", "'ardupilot' or 'px4'")),
         ("--export dxf", ("export", "'dxf'", "'waypoints', 'kml' or 'geojson'")),
         ("--name ../x", ("name", "'../x'")),

@@ -70,6 +70,39 @@ def test_a_log_from_elsewhere_is_refused_with_the_distance():
         mission_part(samples_at(np.zeros(0), np.zeros(0), np.zeros(0)), GRID)
 
 
+def over_hills(above_m=0.0):
+    """Take-off to 50 m, a way whose heights above home go from 50 m to -20 and to 190 m, and a landing at its end."""
+    east = np.concatenate((np.full(30, 0.1), np.linspace(0.1, 0.9, 300), np.full(30, 0.9)))
+    up = np.interp(east, [0.1, 0.4, 0.9], [50.0, -20.0, 190.0])
+    up[:30] = np.linspace(0, 50, 30, endpoint=False)
+    up[-30:] = np.linspace(188, 0, 30)
+    up[30:-30] += above_m
+    samples = samples_at(east, 0.5, np.zeros(east.size), height_m=up)
+    lon, lat = (samples.lon_deg[[0, 142, -1]], samples.lat_deg[[0, 142, -1]])
+    return samples, np.column_stack((lon, lat, np.interp(east[[0, 142, -1]], [0.1, 0.4, 0.9], [50.0, -20.0, 190.0])))
+
+
+@pytest.mark.parametrize("altitude_m", [50.0, None])
+@pytest.mark.parametrize("from_home", [True, False])
+def test_a_way_over_hills_is_followed(altitude_m, from_home):
+    samples, way = over_hills()
+    if not from_home:
+        samples.height_m[:] = np.nan
+    part = mission_part(samples, GRID, altitude_m, way)
+    assert part.warnings == ()
+    assert part.in_flight[35:-35].all()
+    assert part.in_flight[:23].sum() == part.in_flight[-27:].sum() == 0
+    # At one height little of it would be taken.
+    assert not mission_part(samples, GRID, 50.0).in_flight[30:-30].all()
+
+
+def test_another_height_over_hills_still_makes_a_map():
+    samples, way = over_hills(above_m=18.0)
+    part = mission_part(samples, GRID, 50.0, way)
+    assert part.in_flight[35:-35].all()
+    assert "not within 10 m of the heights" in part.warnings[0]
+
+
 def test_missed_stops_in_flight_order():
     assert missed_stops(np.array([9, 3, 7, 1]), np.array([1, 3])).tolist() == [9, 7]
 

@@ -190,3 +190,38 @@ def test_homes_given_take_the_place_of_those_before():
     assert changed(single, {"flight": {"homes": two}}, base=Path("/")).flight == several.flight
     with pytest.raises(MissionError, match="either one home or several"):
         spec(flight={"home": one, "homes": two})
+
+
+def test_vehicles_at_once_are_not_planned_over_a_terrain():
+    with pytest.raises(MissionError, match="not planned over a --terrain"):
+        spec(flight={"vehicles": 2, "terrain": "dem.tif"})
+
+
+@pytest.mark.parametrize("t90_s", [0.0, 10.0, 30.0, 47.3])
+def test_a_hold_by_the_sensor_is_long_enough_for_95_percent_and_no_longer(t90_s, tmp_path):
+    asked = {"planner": "monte-carlo"}, {"hold_s": "auto"}
+    spec = specification(
+        {"name": "m", "area": {"bbox": BOX}, "search": asked[0], "flight": asked[1], "sensor": {"t90_s": t90_s}},
+        base=tmp_path,
+    )
+    hold_s = spec.flight.hold_s
+
+    def shown(seconds):
+        return 1 - 0.1 ** (seconds / t90_s) if t90_s else 1.0
+
+    assert shown(hold_s) >= 0.95
+    assert hold_s == 0 or shown(hold_s - 1) < 0.95
+    (tmp_path / "mission.toml").write_bytes(specification_toml(spec, tmp_path))
+    assert read_specification(tmp_path / "mission.toml") == spec
+    again = changed(spec, {"flight": {"hold_s": "auto"}, "sensor": {"t90_s": 2 * t90_s}}, base=tmp_path)
+    assert again.flight.hold_s >= hold_s
+
+
+@pytest.mark.parametrize(
+    ("search", "words"), [({}, "refined planner places its dwells"), ({"planner": "monte-carlo"}, "say which one")]
+)
+def test_a_hold_by_the_sensor_needs_one_and_algorithm_1(search, words, tmp_path):
+    with pytest.raises(MissionError, match=words):
+        specification(
+            {"name": "m", "area": {"bbox": BOX}, "search": search, "flight": {"hold_s": "auto"}}, base=tmp_path
+        )

@@ -24,20 +24,38 @@ def check(
             show_default=False,
         ),
     ] = None,
+    terrain: Annotated[
+        Path | None,
+        typer.Option(
+            "--terrain",
+            help="Elevation model (GeoTIFF) to check the legs against (default: the mission's).",
+            metavar="DEM.tif",
+            show_default=False,
+        ),
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            "--clearance",
+            help="Least height above it, m (default: the mission's height less its tolerance, 10 of other plans).",
+            metavar="M",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Json = False,
     quiet: Annotated[bool, quiet_option("Print only the faults.")] = False,
     verbose: Verbose = False,
 ) -> None:
-    """Check a plan: limits, order, positions, legs against fences, home and rally points, endurance, edits.
+    """Check a plan: limits, order, positions, legs against fences and terrain, home, endurance, edits.
 
-    Ends with 1 when it finds a fault. It knows no rules of the air, obstacles or terrain.
+    Ends with 1 when it finds a fault. It knows no rules of the air and no obstacles.
 
     sparsor check missions/doha
     """
     del verbose
     from sparsor.journeys.checking import check_plans
 
-    found = check_plans(plan, vehicle)
+    found = check_plans(plan, vehicle, terrain=terrain, clearance_m=clearance)
     if as_json:
         print_json(
             {

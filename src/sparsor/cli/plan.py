@@ -197,7 +197,12 @@ def plan(
     ] = None,
     altitude: Annotated[
         float | None,
-        _option(FLIGHT, "Height above home, m (default: 50; 0 for rovers and boats).", "--altitude", metavar="M"),
+        _option(
+            FLIGHT,
+            "Height above home, or above the ground of --terrain, m (default: 50; 0 for rovers and boats).",
+            "--altitude",
+            metavar="M",
+        ),
     ] = None,
     speed: Annotated[
         float | None,
@@ -209,13 +214,14 @@ def plan(
         ),
     ] = None,
     hold: Annotated[
-        float | None,
+        str | None,
         _option(
             FLIGHT,
-            "Dwell time at each stop of Algorithm 1; one dwell of the refined search, which places as many as pay, s "
-            "(default: 5; planes and VTOLs: 0, flown through, and circles otherwise).",
+            "Dwell time at each stop of Algorithm 1, s, or auto: until the sensor (--t90, --sensor-profile) shows 95 % "
+            "of a step; one dwell of the refined search, which places as many as pay by itself (default: 5; planes and "
+            "VTOLs: 0, flown through, and circles otherwise).",
             "--hold",
-            metavar="S",
+            metavar="S|auto",
         ),
     ] = None,
     home: Annotated[
@@ -283,6 +289,35 @@ def plan(
         float | None,
         _option(
             WHERE, "How good that file is, kept as a margin, m (default: 500).", "--coastline-accuracy", metavar="M"
+        ),
+    ] = None,
+    terrain: Annotated[
+        Path | None,
+        _option(
+            FLIGHT,
+            "Elevation model (GeoTIFF): --altitude is kept above it along all legs. It knows no trees and buildings.",
+            "--terrain",
+            metavar="DEM.tif",
+        ),
+    ] = None,
+    terrain_tolerance: Annotated[
+        float | None,
+        _option(
+            FLIGHT,
+            "How much lower or higher a leg may be (default: a tenth of --altitude, 2 m at least).",
+            "--terrain-tolerance",
+            metavar="M",
+        ),
+    ] = None,
+    trigger: Annotated[
+        list[str] | None,
+        _option(
+            FLIGHT,
+            "Switched on at each stop that is dwelt at and off after it: servo:CHANNEL:PWM_ON:PWM_OFF, relay:NUMBER, "
+            "message:ID (to a script; these ArduPilot only); camera-distance:METRES from the first stop to the last. "
+            "Repeatable.",
+            "--trigger",
+            metavar="WHAT",
         ),
     ] = None,
     sensor_profile: Annotated[
@@ -361,7 +396,7 @@ def plan(
             "autopilot": autopilot,
             "altitude_m": altitude,
             "speed_m_s": speed,
-            "hold_s": hold,
+            "hold_s": _number(hold),
             **homes_given(home),
             "home_altitude_m": home_altitude,
             "wind": wind,
@@ -371,6 +406,9 @@ def plan(
             "separation_m": separation,
             "keep_out": tuple(keep_out) if keep_out else None,
             "keep_out_margin_m": keep_out_margin,
+            "terrain": terrain,
+            "trigger": tuple(trigger) if trigger else None,
+            "terrain_tolerance_m": terrain_tolerance,
         },
         "coast": _coast(coastline, coastline_accuracy, land_only=land_only, sea_only=sea_only),
         "sensor": {"profile": sensor_profile, "t90_s": t90} if (sensor_profile, t90) != (None, None) else None,
@@ -468,6 +506,14 @@ def _as_typed(message: str) -> str:
     message = re.sub(r"\b(?:search|flight|prior|sensor|output)\.(\w+?)(?:_m|_m_s|_s)?(?:\.\d+)?:", r"--\1:", message)
     message = re.sub(r"\barea\.(?:\w+\.)?bbox(?:\.\d+)?:|\barea:", "--bbox or --area:", message)
     return re.sub(r"--[a-z_]+:", lambda option: option[0].replace("_", "-"), message)
+
+
+def _number(text: str | None) -> float | str | None:
+    """Return a number where there is one; what else was typed is judged with the rest."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _cleaned(name: str) -> str:

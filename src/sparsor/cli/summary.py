@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "theta": found.theta,
         "cost": found.cost,
         "incoherence": found.incoherence,
+        "terrain": None if mission.ground_facts is None else asdict(mission.ground_facts),
         "seed": spec.search.seed,
         **({} if mission.before is None else {"resumed": _resumed_values(mission.before, spec)}),
         "warnings": list(mission.warnings),
@@ -113,6 +115,15 @@ def mission_rows(mission: PlannedMission, *, details: bool) -> list[tuple[str, s
                 f"{before.covered.total_m / 1000:.2f} km over the stops flown; budget of this flight: "
                 f"{spec.search.budget}",
             ),
+        )
+    if mission.ground_facts is not None:
+        over = mission.ground_facts
+        table.append(
+            (
+                "over the ground",
+                f"{over.least_m:.0f} to {over.most_m:.0f} m, {over.lowest_m:.0f} to {over.highest_m:.0f} m above home, "
+                f"by {over.passed} waypoints beside the stops ({over.file})",
+            )
         )
     if mission.sensor is not None:
         table.append(("sensor", mission.sensor.words))

@@ -99,6 +99,7 @@ def measure(
     t90_s: float | None = None,
     stops: NDArray[np.int64] | None = None,
     altitude_m: float | None = None,
+    way: NDArray[np.float64] | None = None,
     heights_m: Sequence[float] = (),
 ) -> Measured:
     """Return what a flight measured, with what was left out and why.
@@ -116,9 +117,11 @@ def measure(
     stops : array of int64 (m,), optional
         Planned cells in flight order.
     altitude_m : float, optional
-        The mission's height above home.
+        The mission's height above home, or above the ground.
+    way : array of float64 (k, 3), optional
+        Longitude, latitude and height above home of what was to be flown, where the heights differ.
     heights_m : sequence of float
-        Those of several vehicles at once.
+        Heights of several vehicles at once.
 
     Raises
     ------
@@ -127,7 +130,7 @@ def measure(
     DesignError
         When fewer than two cells were measured.
     """
-    part = mission_part(samples, grid, altitude_m, heights_m=heights_m)
+    part = mission_part(samples, grid, altitude_m, way, heights_m=heights_m)
     reading = samples.value if value is None else value
     reason = sensor_faults(samples.time_s, samples.boot, samples.value, profile)
     reason[np.isnan(reading)] = Reason.UNCALIBRATED

@@ -9,6 +9,7 @@ import numpy as np
 
 from sparsor.errors import LogError
 from sparsor.geodesy.lengths import distance_m
+from sparsor.geodesy.plane import LocalPlane
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 BAND: Final = 0.2
 """Half the height of the band around the mission's height, as a share of that height."""
 LEAST_BAND_M: Final = 2.0
+WAY_BAND_M: Final = 10.0
+"""The same round a way whose height above the ground nobody knows."""
 OUTSIDE = -1
 _MODE_WIDTH_M = 4.0
 _AIRBORNE = 0.5  # above this share of the usual height nothing takes off or lands
@@ -45,7 +48,12 @@ class MissionPart:
 
 
 def mission_part(
-    samples: Samples, grid: Grid, altitude_m: float | None = None, *, heights_m: Sequence[float] = ()
+    samples: Samples,
+    grid: Grid,
+    altitude_m: float | None = None,
+    way: NDArray[np.float64] | None = None,
+    *,
+    heights_m: Sequence[float] = (),
 ) -> MissionPart:
     """Tell the mission from the way to it, take-off and landing.
 
@@ -60,6 +68,10 @@ def mission_part(
         The mission's height above home. Without it, or where nothing was flown at it, all above half of the height
         that was flown most counts. Where only altitudes above the sea are known, nobody knows how high home is: what
         was flown most is taken for the mission's height.
+    way : array of float64 (k, 3), optional
+        Longitude, latitude and height above home of what was to be flown, in order, where it is not at one height: over
+        terrain, say. The mission's height is then that of the nearest place on it, and `altitude_m` the height above
+        the ground.
     heights_m : sequence of float
         Heights of several vehicles at once, each as good as the other; where only altitudes above the sea are known all
         above half of what was flown most counts.
@@ -78,6 +90,10 @@ def mission_part(
     unknown = np.isnan(height_m)
     if unknown.all():
         return MissionPart(np.ones(cell.size, dtype=np.bool_), cell, ())
+    if way is not None:
+        return _along_the_way(
+            samples, height_m if from_home else samples.alt_m, cell, altitude_m, way, from_home=from_home
+        )
     usual_m = _mode(height_m[~unknown])
     airborne = unknown | (height_m >= _AIRBORNE * usual_m) | (usual_m < LEAST_BAND_M)
     if altitude_m is None:
@@ -97,6 +113,66 @@ def mission_part(
         "all samples above half of that height were taken"
     )
     return MissionPart(airborne, cell, (warning,))
+
+
+def _along_the_way(
+    samples: Samples,
+    height_m: NDArray[np.float64],
+    cell: NDArray[np.int64],
+    altitude_m: float | None,
+    way: NDArray[np.float64],
+    *,
+    from_home: bool,
+) -> MissionPart:
+    unknown = np.isnan(height_m)
+    above_m = height_m - heights_on(way, samples.lon_deg, samples.lat_deg)
+    if not from_home:  # above the sea: most of the log is the mission
+        above_m = above_m - np.nanmedian(above_m)
+    half_m = max(BAND * altitude_m, LEAST_BAND_M) if altitude_m is not None else WAY_BAND_M
+    in_band = unknown | (np.abs(above_m) <= half_m)
+    low_m = half_m / BAND * _AIRBORNE
+    airborne = unknown | (above_m >= -low_m)
+    inside = cell != OUTSIDE
+    if 2 * (in_band & inside).sum() >= (airborne & inside).sum():
+        return MissionPart(in_band, cell, ())
+    warning = (
+        f"most of the flight was not within {half_m:g} m of the heights that the mission was planned at: all samples "
+        f"above {low_m:g} m below them were taken"
+    )
+    return MissionPart(airborne, cell, (warning,))
+
+
+def heights_on(
+    way: NDArray[np.float64], lon_deg: NDArray[np.float64], lat_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the height of the nearest place on a way, straight between its points.
+
+    Parameters
+    ----------
+    way : array of float64 (k, 3)
+        Longitude, latitude, height; one point or more.
+    lon_deg, lat_deg : arrays of float64 (n,)
+
+    Examples
+    --------
+    >>> way = np.array([[51.50, 25.3, 40.0], [51.51, 25.3, 60.0]])
+    >>> heights_on(way, np.array([51.49, 51.505]), np.array([25.3, 25.301])).round(6).tolist()
+    [40.0, 50.0]
+    """
+    plane = LocalPlane(float(way[0, 0]), float(way[0, 1]))
+    turns, at = plane.metres(way[:, 0], way[:, 1]), plane.metres(lon_deg, lat_deg)
+    nearest = np.full(at.shape[0], np.inf)
+    height = np.full(at.shape[0], way[0, 2])
+    pairs = zip(turns[:-1], turns[1:], way[:-1, 2], way[1:, 2], strict=True) if len(way) > 1 else ()
+    for start, end, from_m, to_m in pairs:
+        step = end - start
+        length2 = float(step @ step)
+        share = np.clip((at - start) @ step / length2, 0.0, 1.0) if length2 > 0 else np.zeros(at.shape[0])
+        away = np.hypot(*(at - start - share[:, None] * step).T)
+        nearer = away < nearest
+        nearest[nearer] = away[nearer]
+        height[nearer] = (from_m + share * (to_m - from_m))[nearer]
+    return height
 
 
 def missed_stops(stops: NDArray[np.int64], visited: NDArray[np.int64]) -> NDArray[np.int64]:

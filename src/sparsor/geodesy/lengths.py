@@ -11,7 +11,7 @@ from sparsor.errors import AreaError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-    from pyproj import Geod
+    from pyproj import Geod, Transformer
 
 
 @cache
@@ -91,3 +91,58 @@ def to_wgs84(x: ArrayLike, y: ArrayLike, crs: str) -> tuple[NDArray[np.float64],
     except CRSError as error:
         raise AreaError(f"the reference system is not understood ({error})") from error
     return np.asarray(lon, dtype=np.float64), np.asarray(lat, dtype=np.float64)
+
+
+def from_wgs84(lon_deg: ArrayLike, lat_deg: ArrayLike, crs: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return points in another reference system, first east then north; the way back of `to_wgs84`.
+
+    Points that have no place there come back as infinities.
+    """
+    x, y = _to_level(crs).transform(np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
+    return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+
+
+@cache
+def _to_level(crs: str) -> Transformer:
+    """Return what brings degrees to a system; of one with heights to its level part: they may need grids."""
+    from pyproj import CRS, Transformer
+
+    level = CRS.from_user_input(crs)
+    level = level.sub_crs_list[0] if level.is_compound else level.to_2d()
+    return Transformer.from_crs("EPSG:4326", level, always_xy=True)
+
+
+def vertical_of(crs: str) -> tuple[str, float] | None:
+    """Return the name of a reference system's heights and the metres of their unit; None where it says nothing of them.
+
+    Examples
+    --------
+    >>> vertical_of("EPSG:4326") is None, vertical_of("EPSG:4326+5773")
+    (True, ('EGM96 height', 1.0))
+    """
+    from pyproj import CRS
+
+    known = CRS.from_user_input(crs)
+    if known.is_compound:
+        part = known.sub_crs_list[1]
+        return part.name, float(part.axis_info[0].unit_conversion_factor)
+    if len(known.axis_info) == 3:
+        return f"above the ellipsoid of {known.name}", float(known.axis_info[2].unit_conversion_factor)
+    return None
+
+
+def line_deg(
+    start: tuple[float, float], end: tuple[float, float], step_m: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return points along a geodesic, both ends among them, at most a step apart.
+
+    Returns
+    -------
+    along_m, lon_deg, lat_deg : arrays of float64 (n,)
+        n is 2 at least.
+    """
+    azimuth_deg, _, length_m = wgs84().inv(*start, *end)
+    along_m = np.linspace(0.0, length_m, max(int(np.ceil(length_m / step_m)), 1) + 1)
+    same = np.ones_like(along_m)
+    lon, lat, _ = wgs84().fwd(start[0] * same, start[1] * same, azimuth_deg * same, along_m)
+    return along_m, np.asarray(lon, dtype=np.float64), np.asarray(lat, dtype=np.float64)

@@ -75,6 +75,8 @@ class Flights:
             fence_margin_m=flight.fence_margin_m,
             wind=prepared.wind,
             zones=prepared.place.zones,
+            ground=prepared.ground,
+            triggers=flight.triggers,
         )
 
     def time(self, plan: MissionPlan) -> FlightTime:
@@ -106,10 +108,16 @@ def whole_flight(spec: MissionSpecification, prepared: Prepared, candidate: Cand
 
 def _homes(spec: MissionSpecification, prepared: Prepared, candidate: Candidate) -> tuple[Home, ...]:
     """Return the homes that were given, else the route's first stop."""
-    altitude = spec.flight.home_altitude_m
     lon, lat = prepared.place.grid.centres_deg(candidate.stops[:1])
     places = spec.flight.given_homes or ((float(lon[0]), float(lat[0])),)
-    return tuple(Home(*place, altitude or 0.0, altitude_known=altitude is not None) for place in places)
+    return tuple(_home(spec, prepared, place) for place in places)
+
+
+def _home(spec: MissionSpecification, prepared: Prepared, place: tuple[float, float]) -> Home:
+    altitude = spec.flight.home_altitude_m
+    if altitude is None and prepared.ground is not None:
+        altitude = round(prepared.ground.home_m(place), 1)
+    return Home(*place, altitude or 0.0, altitude_known=altitude is not None)
 
 
 def _nearer_end_first(home: Home, prepared: Prepared, candidate: Candidate) -> Candidate:

@@ -15,6 +15,7 @@ from sparsor.journeys.folder import SPECIFICATION_FILE
 from sparsor.journeys.modelling import choose_prior, size_difference
 from sparsor.mission import read_plan
 from sparsor.mission.items import FRAME_RELATIVE
+from sparsor.mission.plan import flown_way
 from sparsor.mission.sidecar import content_hash, read_sidecar
 from sparsor.mission.specification import PriorSection
 
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from sparsor.mission.sidecar import Sidecar
     from sparsor.prior.model import Model
     from sparsor.vehicle import SensorProfile
+
+
+HEIGHT_M = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,9 @@ class FlownMission:
     stops : array of int64 (n,)
         Planned cells in flight order; of a resumed mission first those that earlier flights measured.
     altitude_m : float or None
-        Height of the stops above home.
+        Height of the stops above home, or of the flight above the ground.
+    way : array of float64 (n, 3) or None
+        Longitude, latitude and height above home of what is flown, where the heights differ.
     phi : array of bool (M, N) or None
         The planned measurement matrix.
     sensor : SensorProfile or None
@@ -72,6 +78,7 @@ class FlownMission:
     widening: float
     stops: NDArray[np.int64]
     altitude_m: float | None
+    way: NDArray[np.float64] | None
     phi: NDArray[np.bool_] | None
     sensor: SensorProfile | None
     warnings: tuple[str, ...]
@@ -107,6 +114,7 @@ def mission_of_folder(folder: Path) -> FlownMission:
         widening=widening,
         stops=np.concatenate((sidecar.flown, stops)),
         altitude_m=sidecar.altitude_m,
+        way=sidecar.way if len(sidecar.way) else None,
         phi=sidecar.phi,
         sensor=sidecar.sensor,
         warnings=warnings,
@@ -156,6 +164,7 @@ def mission_of_plan(
         widening=prior.widening,
         stops=stops,
         altitude_m=_one_height_m(plan),
+        way=_way_of_heights(plan),
         phi=None,
         sensor=None,
         warnings=prior.warnings,
@@ -246,19 +255,34 @@ def plan_changes(plan: MissionPlan, sidecar: Sidecar) -> tuple[str, ...]:
     kept_now, kept_then = now[np.isin(now, then)], then[np.isin(then, now)]
     cells = sidecar.grid.cell_at([stop.lon_deg for stop in plan.stops], [stop.lat_deg for stop in plan.stops])
     height_m = _one_height_m(plan)
+    over_ground, moved = sidecar.above_ground, _moved_up_or_down(plan, sidecar)
     said = (
         (gone.size, f"{gone.size} of {then.size} planned cells have no stop any more"),
         (added.size, f"{added.size} stops lie in cells that were not planned"),
         ((cells < 0).sum(), f"{int((cells < 0).sum())} stops lie outside the mission's box"),
         (not np.array_equal(kept_now, kept_then), "the stops come in another order"),
-        (height_m is None, "the stops are at different heights"),
+        (moved > 0, f"{moved} waypoints are at other heights than planned"),
+        (height_m is None and not over_ground, "the stops are at different heights"),
         (
-            height_m is not None and height_m != sidecar.altitude_m,
+            height_m is not None and not over_ground and height_m != sidecar.altitude_m,
             f"the stops are at {height_m:g} m instead of {sidecar.altitude_m:g} m above home" if height_m else "",
         ),
     )
     words = tuple(sentence for holds, sentence in said if holds)
     return words or ("not the stops; home, fence, speeds or other items",)
+
+
+def _moved_up_or_down(plan: MissionPlan, sidecar: Sidecar) -> int:
+    """Return how many waypoints over terrain are at another height than was planned in their place."""
+    planned = {(lon, lat): up_m for lon, lat, up_m in sidecar.way.tolist()}
+    return sum((lon, lat) in planned and abs(planned[lon, lat] - up_m) > HEIGHT_M for lon, lat, up_m in flown_way(plan))
+
+
+def _way_of_heights(plan: MissionPlan) -> NDArray[np.float64] | None:
+    """Return what anybody's plan flies with its heights above home, where they differ and all are above home."""
+    if _one_height_m(plan) is not None or any(stop.frame != FRAME_RELATIVE for stop in plan.stops):
+        return None
+    return np.array([(stop.lon_deg, stop.lat_deg, stop.altitude_m) for stop in plan.stops], dtype=np.float64)
 
 
 def _one_height_m(plan: MissionPlan) -> float | None:

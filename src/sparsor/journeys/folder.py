@@ -11,6 +11,7 @@ import numpy as np
 from sparsor.core.files import write_files
 from sparsor.errors import MissionError
 from sparsor.mission import export_bytes, plan_bytes
+from sparsor.mission.plan import flown_way
 from sparsor.mission.sidecar import Sidecar, content_hash, sidecar_npz
 from sparsor.mission.specification import read_specification, specification_toml
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 SPECIFICATION_FILE = "mission.toml"
 PREVIEW_FILE = "preview.png"
+TERRAIN_FILE = "terrain.png"
 CURVE_FILES = ("pareto.csv", "pareto.png")
 
 
@@ -93,6 +95,10 @@ def write_mission(
         from sparsor.journeys.preview import preview_png
 
         contents[PREVIEW_FILE] = preview_png(mission)
+        if mission.ground is not None:
+            from sparsor.journeys.heightprofile import terrain_png
+
+            contents[TERRAIN_FILE] = terrain_png(mission)
     contents |= beside or {}
     inputs = {path.resolve() for path in spec.inputs}
     stale = {folder / file for file in _files_before(folder) - contents.keys()}
@@ -106,7 +112,13 @@ def write_mission(
 def _files(spec: MissionSpecification) -> set[str]:
     """Return the names of the files that a mission consists of."""
     suffixes = ("plan", "npz", *spec.output.export)
-    return {SPECIFICATION_FILE, PREVIEW_FILE, *CURVE_FILES, *(f"{spec.name}.{suffix}" for suffix in suffixes)}
+    return {
+        SPECIFICATION_FILE,
+        PREVIEW_FILE,
+        TERRAIN_FILE,
+        *CURVE_FILES,
+        *(f"{spec.name}.{suffix}" for suffix in suffixes),
+    }
 
 
 def _files_before(folder: Path) -> set[str]:
@@ -126,6 +138,7 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         cells = np.zeros(phi.shape[1], dtype=np.bool_)
         cells[before.cells] = True
         phi = np.eye(phi.shape[1], dtype=np.bool_)[cells | phi.any(axis=0)]
+    way = [place for one in mission.plans for place in flown_way(one)]
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
@@ -152,4 +165,6 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         passing=tuple(passed),
         flown=np.zeros(0, dtype=np.int64) if before is None else before.stops,
         heights_m=() if mission.sorties is None else mission.sorties.heights_m,
+        above_ground=mission.ground is not None,
+        way=np.array([] if mission.ground is None else way, dtype=np.float64).reshape(-1, 3),
     )

@@ -130,6 +130,12 @@ def _kept_out(sidecar: Sidecar) -> str:
     return f", {count} of them kept out of and estimated from around" if count else ""
 
 
+def _above(sidecar: Sidecar) -> str:
+    if not sidecar.above_ground:
+        return "home"
+    return f"the ground, {sidecar.way[:, 2].min():g} to {sidecar.way[:, 2].max():g} m above home"
+
+
 def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
     box = sidecar.grid.box
     known = "" if sidecar.home_altitude_known else " (unknown, written as 0)"
@@ -138,7 +144,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         f"Box: {' '.join(f'{side:g}' for side in box.as_tuple())} (west south east north), "
         f"{box.east_m / 1000:.4g} x {box.north_m / 1000:.4g} km; {int(sidecar.allowed.sum())} cells inside"
         f"{_kept_out(sidecar)}.",
-        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above home, {_holds(sidecar)}.",
+        f"{sidecar.stops.size} stops at {sidecar.altitude_m:g} m above {_above(sidecar)}, {_holds(sidecar)}.",
         *((f"{sidecar.flown.size} more were measured by the flights that it resumes.",) if sidecar.flown.size else ()),
         f"Home: {sidecar.home[0]:.7f} E, {sidecar.home[1]:.7f} N, {sidecar.home[2]:g} m AMSL{known}.",
         f"Expected error: {sidecar.expected['relative_error']:.3f} of the map's contrast (|s - s'| / |s - mean(s)|).",
@@ -151,6 +157,7 @@ def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:
         "stops": int(sidecar.stops.size),
         "stops_flown_before": int(sidecar.flown.size),
         "altitude_m": sidecar.altitude_m,
+        "above_ground": sidecar.above_ground,
         "hold_s": sidecar.hold_s,
         "home": list(sidecar.home),
         "home_altitude_known": sidecar.home_altitude_known,

@@ -9,7 +9,7 @@ import numpy as np
 
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
-from sparsor.design import Weights
+from sparsor.design import Weights, parse_budget
 from sparsor.design.expectation import expected_errors
 from sparsor.errors import MissionError
 from sparsor.geodesy.lengths import path_length_m
@@ -18,6 +18,7 @@ from sparsor.journeys.algorithm1 import search_algorithm_1
 from sparsor.journeys.fleet import FAILSAFE, cut_for_vehicles
 from sparsor.journeys.flights import whole_flight
 from sparsor.journeys.flownerror import Expected, flown_by_algorithm_1, flown_candidate, flown_refined
+from sparsor.journeys.groundwork import GroundFacts, check_over, ground_facts, said_of_ground
 from sparsor.journeys.keepingout import said_of_shore
 from sparsor.journeys.preparing import Place, Prepared, prepare
 from sparsor.journeys.refining import search_refined
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from sparsor.journeys.modelling import PriorChoice
     from sparsor.journeys.refining import Known
     from sparsor.journeys.resuming import Before
+    from sparsor.mission.following import Ground
     from sparsor.mission.specification import MissionSpecification
 
 _STRAIGHT = (
@@ -83,6 +85,9 @@ class PlannedMission:
         What was flown of the mission that this one resumes; the errors above are of all flights together.
     flown : Candidate or None
         What the sorties fly: all their stops, one flight after the other, and the Phi that they measure.
+    ground : Ground or None
+        That heights are kept above.
+    ground_facts : GroundFacts or None
     """
 
     specification: MissionSpecification
@@ -104,6 +109,8 @@ class PlannedMission:
     sorties: Sorties | None = None
     before: Before | None = None
     flown: Candidate | None = None
+    ground: Ground | None = None
+    ground_facts: GroundFacts | None = None
 
     @property
     def measured(self) -> Candidate:
@@ -280,6 +287,12 @@ def _assemble(
                 *([FAILSAFE] if cut.apart_m is not None and vehicle.flies else []),
             )
     _check(mission, prepared.wind)
+    if prepared.ground is not None:
+        check_over(mission.plans, prepared.ground, vehicle)
+        facts = ground_facts(mission.plans, prepared.ground, vehicle)
+        mission = replace(mission, ground=prepared.ground, ground_facts=facts)
+        over = said_of_ground(facts, plan, prepared.ground, vehicle, spec.flight.home_altitude_m)
+        warnings = (*warnings, *over, *_beyond_budget(mission))
     said = (*warnings, *advice(mission), *beyond, *said_of_shore(mission), *_of_the_plans(mission), *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))
 
@@ -326,3 +339,15 @@ def _check(mission: PlannedMission, wind: SteadyWind) -> None:
     faults = [fault.sentence for fault in found if fault.fails]
     if mission.flyable and faults:
         raise MissionError(f"the plan fails its checks and is not written: {' '.join(faults)}")
+
+
+def _beyond_budget(mission: PlannedMission) -> tuple[str, ...]:
+    """Say it where the climbs over terrain, which the search does not know, take more than a budget of time."""
+    asked = mission.specification.search.budget
+    budget = None if asked is None else parse_budget(asked)
+    if budget is None or budget.measure != "time" or mission.flight_time_s <= budget.value:
+        return ()
+    return (
+        "Climbing and sinking over the ground take longer than the search counted: "
+        f"{mission.flight_time_s / 60:.1f} min, beyond {budget.value / 60:g} min: give a smaller --budget.",
+    )

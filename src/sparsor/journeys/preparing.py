@@ -15,10 +15,12 @@ from sparsor.geodesy import BoundingBox, Grid
 from sparsor.geodesy.areas import Area, cells_inside, read_area
 from sparsor.geodesy.shore import OTHER
 from sparsor.journeys.flown import folder_sidecar
+from sparsor.journeys.groundwork import mission_ground
 from sparsor.journeys.keepingout import barred_legs, mission_shore, mission_zones
 from sparsor.journeys.legtimes import home_seconds, leg_seconds_between
 from sparsor.journeys.modelling import PriorChoice, choose_prior, size_difference
 from sparsor.mission.specification import PAPER_ROWS
+from sparsor.mission.triggers import check_triggers
 from sparsor.vehicle import (
     CALM,
     Autopilot,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from sparsor.core.workers import Workers
     from sparsor.geodesy.shore import Shore
     from sparsor.geodesy.zones import Zones
+    from sparsor.mission.following import Ground
     from sparsor.mission.specification import MissionSpecification
 
 
@@ -92,6 +95,8 @@ class Prepared:
     speed_m_s : float
         Along legs.
     wind : SteadyWind
+    ground : Ground or None
+        That heights are kept above.
     """
 
     place: Place
@@ -102,6 +107,7 @@ class Prepared:
     sensor: SensorProfile | None
     speed_m_s: float
     wind: SteadyWind = CALM
+    ground: Ground | None = None
 
     def hold(self, spec: MissionSpecification) -> tuple[float, float]:
         """Return one hold at a stop, as it is written, and the braking that goes with it, both seconds."""
@@ -168,7 +174,9 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     """
     vehicle = load_vehicle(spec.flight.vehicle)
     autopilot, sensor = autopilot_named(spec.flight.autopilot), sensor_of(spec)
+    check_triggers(spec.flight.triggers, autopilot)
     box, area = _where(spec)
+    ground = mission_ground(spec, box, vehicle)
     if spec.resume is None:
         prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
     else:
@@ -178,7 +186,8 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
     wind = spec.flight.steady_wind
     check_wind(vehicle, wind, speed)
-    return Prepared(place, prior, _legs(place, vehicle, speed, wind), vehicle, autopilot, sensor, speed, wind)
+    legs = _legs(place, vehicle, speed, wind)
+    return Prepared(place, prior, legs, vehicle, autopilot, sensor, speed, wind, ground)
 
 
 def _prior_flown(spec: MissionSpecification, box: BoundingBox, folder: Path) -> PriorChoice:

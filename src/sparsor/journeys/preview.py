@@ -151,7 +151,7 @@ def _caption(mission: PlannedMission) -> tuple[str, ...]:
     return (
         f"{found.stops.size} stops, {mission.path_length_m / 1000:.1f} km over the stops "
         f"({mission.coverage_fraction:.1%} of full coverage), "
-        f"{mission.specification.flight.altitude_m:g} m above home.",
+        f"{mission.specification.flight.altitude_m:g} m above {'home' if mission.ground is None else 'the ground'}.",
         f"{mission.flight_time_s / 60:.0f} min in the air; {mission.vehicle.name}: {mission.usable_s / 60:.0f} min "
         f"less its reserve{'' if mission.flyable else ' - a planning study, not flyable'}.",
         f"Expected error {mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|).",

@@ -252,6 +252,7 @@ def measured_flight(
         value=readings.value,
         stops=mission.stops if whole else None,
         altitude_m=mission.altitude_m,
+        way=mission.way,
         heights_m=mission.heights_m,
     )
     return MeasuredFlight(logged, readings, measured)

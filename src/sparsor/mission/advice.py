@@ -8,6 +8,7 @@ from sparsor.geodesy.lengths import distance_m
 from sparsor.mission.items import NAV_LOITER_TO_ALT
 
 if TYPE_CHECKING:
+    from sparsor.mission.following import Ground
     from sparsor.mission.plan import MissionPlan
     from sparsor.vehicle import Autopilot, Vehicle
 
@@ -18,11 +19,18 @@ PX4_LOW_TAKE_OFF_M = 11.0
 PX4_FIRST_WAYPOINT_M = 900.0
 
 
-def build_warnings(plan: MissionPlan, vehicle: Vehicle, autopilot: Autopilot, wanted_hold_s: float) -> tuple[str, ...]:
-    """Return the warnings about a plan that was just built."""
+def build_warnings(
+    plan: MissionPlan,
+    vehicle: Vehicle,
+    autopilot: Autopilot,
+    wanted_hold_s: float,
+    altitude_m: float,
+    ground: Ground | None,
+) -> tuple[str, ...]:
+    """Return the warnings about a plan that was just built; `altitude_m` is above home, or above `ground`."""
     found = [
         _home_altitude(plan),
-        _ceiling(plan, vehicle),
+        _ceiling(vehicle, altitude_m, "home" if ground is None else "the ground"),
         _speed(plan, vehicle),
         _hold(plan, autopilot, wanted_hold_s),
         _antimeridian(plan),
@@ -42,12 +50,11 @@ def _home_altitude(plan: MissionPlan) -> str:
     )
 
 
-def _ceiling(plan: MissionPlan, vehicle: Vehicle) -> str:
-    altitude_m = plan.stops[0].altitude_m
+def _ceiling(vehicle: Vehicle, altitude_m: float, above: str) -> str:
     if altitude_m <= vehicle.ceiling_m:
         return ""
     return (
-        f"The flight is {altitude_m:g} m above home, beyond the ceiling of {vehicle.ceiling_m:g} m in the "
+        f"The flight is {altitude_m:g} m above {above}, beyond the ceiling of {vehicle.ceiling_m:g} m in the "
         "vehicle profile; find out what is allowed where you fly."
     )
 

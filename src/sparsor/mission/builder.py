@@ -10,22 +10,27 @@ import numpy as np
 
 from sparsor.errors import MissionError
 from sparsor.mission.advice import build_warnings
+from sparsor.mission.clearance import height_to_return_at
 from sparsor.mission.fence import MAX_CORNERS, fence_around
-from sparsor.mission.items import NAV_LOITER_TIME, WAYPOINTS
-from sparsor.mission.keepouts import exclusion_circles, exclusions, free_ends, ways_past
+from sparsor.mission.keepouts import exclusion_circles, exclusions
+from sparsor.mission.layout import lay_out
 from sparsor.mission.plan import Home, MissionPlan, RallyPoint
-from sparsor.mission.sequences import BESIDE_STOPS, flight_items, room_of
+from sparsor.mission.sequences import BESIDE_STOPS, Visit, flight_items
 from sparsor.mission.timing import time_plan
+from sparsor.mission.triggers import CAMERA, check_triggers
 from sparsor.vehicle import CALM, Autopilot, SteadyWind, Vehicle, autopilot_named, check_wind
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from sparsor.geodesy.zones import Zones
+    from sparsor.mission.following import Ground
+    from sparsor.mission.triggers import Trigger
 
 # An autopilot stores positions as integers of 1e-7 degrees: what is written is what is flown.
 DECIMALS = 7
-SURVEY = WAYPOINTS | {NAV_LOITER_TIME}
 MAX_SPEED_M_S = 200.0
 MAX_ALTITUDE_M = 20_000.0
 
@@ -43,6 +48,8 @@ def build_mission(
     fence_margin_m: float = 50.0,
     wind: SteadyWind = CALM,
     zones: Zones | None = None,
+    ground: Ground | None = None,
+    triggers: Sequence[Trigger] = (),
 ) -> MissionPlan:
     """Turn a route into a plan that its kind of vehicle flies from take-off to landing.
 
@@ -57,7 +64,7 @@ def build_mission(
     autopilot : Autopilot or str
         ``"ardupilot"`` or ``"px4"``.
     altitude_m : float
-        Of the flight, above home, metres; 0 for what drives or swims.
+        Of the flight, above home, metres; 0 for what drives or swims. Not read with `ground`, which has its own.
     home : Home, optional
         Default: the first stop, its altitude unknown.
     speed_m_s : float, optional
@@ -71,6 +78,10 @@ def build_mission(
     zones : Zones, optional
         What is kept out of: the ways from and to home lead past it, and it is written as exclusion fences. The legs
         between stops are the caller's.
+    ground : Ground, optional
+        What heights are kept above, at the stops and along every leg, by further waypoints where it takes them.
+    triggers : sequence of Trigger
+        What is switched on at each stop that is waited at, and off after it.
 
     Returns
     -------
@@ -82,52 +93,67 @@ def build_mission(
     MissionError
         When a stop, the altitude, speed, hold or margin is out of range, or when there are more items than
         the autopilot stores.
+    TerrainError
+        When the ground is not known under a leg, or is in its way.
     """
     facts = (autopilot if isinstance(autopilot, Autopilot) else autopilot_named(autopilot)).on_board(vehicle)
     lon, lat = _checked_stops(stops_lon_deg, stops_lat_deg)
     home = _rounded(home or Home(float(lon[0]), float(lat[0])))
     speed = _within("speed", vehicle.cruise_m_s if speed_m_s is None else speed_m_s, MAX_SPEED_M_S, "m/s")
     check_wind(vehicle, wind, speed)
-    altitude = _checked_altitude(altitude_m, vehicle)
+    if ground is not None and not vehicle.flies:
+        raise MissionError(f"a {vehicle.kind} stays on the ground: leave --terrain out")
     holds = _checked_holds(hold_s, lon.size, facts)
+    check_triggers(triggers, facts)
+    if any(one.kind != CAMERA for one in triggers) and not any(holds):
+        raise MissionError(
+            "no stop is waited at, so there is none to switch a trigger on at: give --hold with --planner monte-carlo, "
+            "or leave --trigger out"
+        )
+    altitude = _checked_altitude(altitude_m if ground is None else ground.height_m, vehicle)
 
     base = (home.lon_deg, home.lat_deg)
-    stops = list(zip(lon.tolist(), lat.tolist(), strict=True))
-    ends = None
-    if vehicle.circles:
-        ends = free_ends(base, stops[0], stops[-1], vehicle=vehicle, altitude_m=altitude, wind=wind, zones=zones)
-        fence_margin_m += 2.0 * vehicle.turn_radius_m
-    outbound, homebound = ways_past(zones, base, stops[0], stops[-1], ends, lifts=vehicle.lifts)
-    _check_count(lon.size + len(outbound) + len(homebound), facts, vehicle)
-    path = [base, *outbound, *stops, *homebound, base, *([] if ends is None else room_of(ends, vehicle))]
-    items = flight_items(
-        list(zip(lon.tolist(), lat.tolist(), holds, strict=True)),
+    layout = lay_out(
+        [
+            Visit(east, north, altitude, hold)
+            for east, north, hold in zip(lon.tolist(), lat.tolist(), holds, strict=True)
+        ],
+        base,
+        vehicle=vehicle,
+        altitude_m=altitude,
+        speed_m_s=speed,
+        wind=wind,
+        zones=zones,
+        ground=ground,
+    )
+    items, passing = flight_items(
+        layout.visits,
         base,
         vehicle=vehicle,
         autopilot=facts,
-        altitude_m=altitude,
+        ascent=layout.ascent,
         speed_m_s=speed,
-        ends=ends,
-        outbound=outbound,
-        homebound=homebound,
+        ends=layout.ends,
+        triggers=triggers,
     )
-    first = next(index for index, item in enumerate(items) if item.command in SURVEY)
-    last = first + len(outbound) + len(stops)
-    path_lon, path_lat = np.array(path).T
+    _check_count(lon.size, len(items), facts, vehicle)
+    path_lon, path_lat = np.array(layout.path).T
+    fence_margin_m += 2.0 * vehicle.turn_radius_m if vehicle.circles else 0.0
     fence = fence_around(path_lon, path_lat, fence_margin_m, min(MAX_CORNERS, facts.max_fence_points))
+    rally_m = altitude if ground is None else height_to_return_at(items, base, ground)
     plan = MissionPlan(
         items=items,
         home=home,
         fences=(fence, *exclusions(zones)),
         circles=exclusion_circles(zones),
-        passing=(*range(first, first + len(outbound)), *range(last, last + len(homebound))),
-        rally_points=(RallyPoint(home.lon_deg, home.lat_deg, altitude),),
+        passing=passing,
+        rally_points=(RallyPoint(home.lon_deg, home.lat_deg, rally_m),),
         firmware_type=facts.firmware_type,
         vehicle_type=vehicle.mav_type,
         cruise_m_s=speed,
         hover_m_s=speed,
     )
-    return replace(plan, warnings=build_warnings(plan, vehicle, facts, float(np.max(hold_s))))
+    return replace(plan, warnings=build_warnings(plan, vehicle, facts, float(np.max(hold_s)), altitude, ground))
 
 
 def flight_time_s(plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM) -> float:
@@ -196,10 +222,13 @@ def _checked_holds(hold_s: ArrayLike, stops: int, autopilot: Autopilot) -> list[
     return [autopilot.written_hold_s(float(hold)) for hold in np.broadcast_to(given, (stops,))]
 
 
-def _check_count(stops: int, autopilot: Autopilot, vehicle: Vehicle) -> None:
-    most = max_stops(autopilot, vehicle.kind)
-    if stops > most:
-        raise MissionError(
-            f"{stops} stops are too many for one mission: {autopilot.title} stores {autopilot.max_items} "
-            f"items, which leaves {most} stops; plan fewer or split the area"
-        )
+def _check_count(stops: int, items: int, autopilot: Autopilot, vehicle: Vehicle) -> None:
+    if items + int(autopilot.home_is_item_0) <= autopilot.max_items:
+        return
+    beside = items - stops - BESIDE_STOPS[vehicle.kind]
+    also = f", with {beside} items beside them (past keep-outs, over terrain, triggers)," if beside else ""
+    eased = "; a larger --terrain-tolerance needs fewer of those" if beside else ""
+    raise MissionError(
+        f"{stops} stops{also} are too many for one mission: {autopilot.title} stores {autopilot.max_items} items, "
+        f"which leaves {max_stops(autopilot, vehicle.kind)} stops; plan fewer or split the area{eased}"
+    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from sparsor.mission.fault import Fault
 from sparsor.mission.fencefaults import fence_faults
 from sparsor.mission.items import (
+    ARDUPILOT_ONLY,
     DO_CHANGE_SPEED,
     DO_LAND_START,
     FLOWN_TO,
@@ -37,9 +38,10 @@ def plan_faults(plan: MissionPlan) -> tuple[str, ...]:
     return tuple(fault.sentence for fault in judged_faults(plan))
 
 
-def judged_faults(plan: MissionPlan) -> tuple[Fault, ...]:
-    """Return each fault noticed, with whether it is serious."""
-    return (*_order(plan), *_positions(plan), *_limits(plan), *_frames(plan), *fence_faults(plan))
+def judged_faults(plan: MissionPlan, *, over_terrain: bool = False) -> tuple[Fault, ...]:
+    """Return each fault noticed; of a plan whose heights are checked against the ground none of those above home."""
+    heights = () if over_terrain else _heights(plan)
+    return (*_order(plan), *_positions(plan), *heights, *_limits(plan), *_frames(plan), *fence_faults(plan))
 
 
 def _order(plan: MissionPlan) -> Iterator[Fault]:
@@ -92,6 +94,10 @@ def _positions(plan: MissionPlan) -> Iterator[Fault]:
                 f"Item {place} (command {item.command}) lies at 0/0, which ArduPilot reads as 'here'.",
                 serious=item.command not in POSITION_OPTIONAL,
             )
+
+
+def _heights(plan: MissionPlan) -> Iterator[Fault]:
+    for place, item in enumerate(plan.items, start=1):
         flies = plan.vehicle_type not in STAYS_DOWN
         if flies and item.command in WAYPOINTS and item.frame == FRAME_RELATIVE and item.altitude_m <= 0:
             yield Fault(f"Item {place} is a waypoint {item.altitude_m:g} m above home.")
@@ -128,5 +134,7 @@ def _frames(plan: MissionPlan) -> Iterator[Fault]:
             yield Fault(
                 f"Item {place} (command {item.command}) is in frame {item.frame}; PX4 takes only frame 2.", True
             )
+        elif item.command in ARDUPILOT_ONLY:
+            yield Fault(f"Item {place} (command {item.command}) is one that PX4 refuses in a mission.", True)
         elif item.frame == FRAME_TERRAIN:
             yield Fault(f"Item {place} (command {item.command}) is above terrain (frame 10), which PX4 refuses.", True)

@@ -26,7 +26,11 @@ NAV_VTOL_LAND = 85
 NAV_DELAY = 93
 NAV_PAYLOAD_PLACE = 94
 DO_CHANGE_SPEED = 178
+DO_SET_RELAY = 181
+DO_SET_SERVO = 183
 DO_LAND_START = 189
+DO_SET_CAM_TRIGG_DIST = 206
+DO_SEND_SCRIPT_MESSAGE = 217
 
 # MAV_FRAME: altitude above sea level, none (a command without a position), above home, above terrain.
 FRAME_GLOBAL = 0
@@ -38,6 +42,7 @@ WAYPOINTS = frozenset({NAV_WAYPOINT, NAV_SPLINE_WAYPOINT})
 TAKE_OFFS = frozenset({NAV_TAKEOFF, NAV_VTOL_TAKEOFF})
 LANDINGS = frozenset({NAV_LAND, NAV_VTOL_LAND})
 LOITERS = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LOITER_TO_ALT})
+ARDUPILOT_ONLY = frozenset({DO_SET_RELAY, DO_SET_SERVO, DO_SEND_SCRIPT_MESSAGE})  # PX4 refuses them in a mission
 FLOWN_TO = WAYPOINTS | TAKE_OFFS | LANDINGS | LOITERS | {NAV_PAYLOAD_PLACE}
 # An autopilot reads a missing position as "here" for these; for any other the position is the whole point.
 POSITION_OPTIONAL = TAKE_OFFS | LANDINGS | {NAV_PAYLOAD_PLACE} | LOITERS

@@ -73,7 +73,7 @@ def free_ends(
     """
     for turned_deg in TURNS_DEG:
         ends = ends_of(home, first, last, vehicle=vehicle, altitude_m=altitude_m, wind=wind, turned_deg=turned_deg)
-        if zones is None or not _crosses(zones, home, ends, lifts=vehicle.lifts):
+        if zones is None or not crosses(zones, home, ends, lifts=vehicle.lifts):
             return ends
     raise MissionError(
         f"no direction is free for a {vehicle.kind} to come in to {home[0]:g} {home[1]:g} beside what is kept out of: "
@@ -81,7 +81,8 @@ def free_ends(
     )
 
 
-def _crosses(zones: Zones, home: Point, ends: Ends, *, lifts: bool) -> bool:
+def crosses(zones: Zones, home: Point, ends: Ends, *, lifts: bool) -> bool:
+    """Return whether the climb out or the last approach cross what is kept out of."""
     legs = [(ends.touch, home), (ends.circle, home), (ends.circle, ends.touch)]
     if not lifts:
         legs.append((home, ends.climb_out))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from sparsor.errors import MissionError
-from sparsor.mission.items import LANDINGS, NAV_LOITER_TIME, WAYPOINTS
+from sparsor.mission.items import FLOWN_TO, LANDINGS, NAV_LOITER_TIME, WAYPOINTS
 from sparsor.vehicle import AUTOPILOTS
 
 if TYPE_CHECKING:
@@ -138,8 +138,8 @@ class MissionPlan:
     complex_items : tuple of ComplexItem
         Patterns found in a plan that was read.
     passing : tuple of int
-        Indices of the waypoints that only lead past a keep-out and are no stops, as far as that is known; no part of
-        equality, a .plan does not say.
+        Indices of the waypoints that only lead past a keep-out or over terrain and are no stops, as far as that is
+        known; no part of equality, a .plan does not say.
     warnings : tuple of str
         Sentences about this plan, from making or from reading it; no part of equality.
     """
@@ -170,7 +170,11 @@ class MissionPlan:
     @property
     def stops(self) -> tuple[MissionItem, ...]:
         """Waypoints and timed circles of the survey: all but the waypoint over the landing place, or back at home."""
-        stops = [index for index, item in enumerate(self.items) if item.command in WAYPOINTS | {NAV_LOITER_TIME}]
+        stops = [
+            index
+            for index, item in enumerate(self.items)
+            if item.command in WAYPOINTS | {NAV_LOITER_TIME} and not self._only_arrives(index)
+        ]
         if len(stops) > 1 or (stops and stops[-1] + 1 < len(self.items)):
             last = self.items[stops[-1]].params[4:6]
             after = self.items[stops[-1] + 1] if stops[-1] + 1 < len(self.items) else None
@@ -182,6 +186,24 @@ class MissionPlan:
                 stops.pop()
         return tuple(self.items[index] for index in stops if index not in self.passing)
 
+    def _only_arrives(self, index: int) -> bool:
+        """Whether a waypoint arrives where the next item waits: between the two something is switched on."""
+        item = self.items[index]
+        if item.hold_s > 0 or index in self.passing:
+            return False
+        after = next((one for one in self.items[index + 1 :] if one.command in FLOWN_TO), None)
+        waits = after is not None and after.command in WAYPOINTS | {NAV_LOITER_TIME} and after.hold_s > 0
+        return waits and after is not None and after.params[4:6] == item.params[4:6]
+
+
+def flown_way(plan: MissionPlan) -> list[tuple[float, float, float]]:
+    """Return longitude, latitude and height above home of the survey and the ways to and from it, in order.
+
+    Of a plan of ours: all waypoints, which are above home.
+    """
+    at_height = WAYPOINTS | {NAV_LOITER_TIME}
+    return [(item.lon_deg, item.lat_deg, item.altitude_m) for item in plan.items if item.command in at_height]
+
 
 def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """Return the longitudes and latitudes of the ways from home to the first stop and from the last one home.
@@ -190,10 +212,12 @@ def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[f
     """
     home, stops = (plan.home.lon_deg, plan.home.lat_deg), plan.stops
     first, last = ((stop.lon_deg, stop.lat_deg) for stop in (stops[0], stops[-1]))
-    begin = next(index for index, item in enumerate(plan.items) if item is stops[0])
+    begin, end = (
+        next(index for index, item in enumerate(plan.items) if item is stop) for stop in (stops[0], stops[-1])
+    )
     passed = [(index, (plan.items[index].lon_deg, plan.items[index].lat_deg)) for index in plan.passing]
     out = [place for index, place in passed if index < begin]
-    back = [place for index, place in passed if index > begin]
+    back = [place for index, place in passed if index > end]
     return [home, *out, first], [last, *back, home]
 
 

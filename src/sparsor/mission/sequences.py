@@ -6,7 +6,7 @@ docs/mission-items.md has the tables.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +25,14 @@ from sparsor.mission.items import (
     take_off,
     waypoint,
 )
-from sparsor.vehicle import approach_m, approach_up_m, climb_out_m
+from sparsor.mission.triggers import CAMERA
+from sparsor.vehicle import approach_m, climb_out_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sparsor.mission.items import MissionItem
+    from sparsor.mission.triggers import Trigger
     from sparsor.vehicle import Autopilot, SteadyWind, Vehicle
 
 Point = tuple[float, float]
@@ -61,61 +63,129 @@ class Ends:
     touch: Point
 
 
+@dataclass(frozen=True)
+class Visit:
+    """A place on the way between take-off and landing.
+
+    Parameters
+    ----------
+    lon_deg, lat_deg : float
+    altitude_m : float
+        Above home.
+    hold_s : float
+    stop : bool
+        Whether something is measured there; else it is only passed.
+    """
+
+    lon_deg: float
+    lat_deg: float
+    altitude_m: float
+    hold_s: float = 0.0
+    stop: bool = True
+
+    @property
+    def place(self) -> Point:
+        """Longitude and latitude."""
+        return self.lon_deg, self.lat_deg
+
+
+@dataclass(frozen=True)
+class Ascent:
+    """The heights above home at which a flight begins and ends, metres.
+
+    Parameters
+    ----------
+    take_off_m : float
+        That the take-off climbs to.
+    home_m : float
+        Of the waypoint over home before a vertical landing.
+    circle_m : float
+        Of the circle before the last approach of a plane or a VTOL.
+    """
+
+    take_off_m: float
+    home_m: float
+    circle_m: float
+
+
 def flight_items(
-    stops: Sequence[tuple[float, float, float]],
+    visits: Sequence[Visit],
     home: Point,
     *,
     vehicle: Vehicle,
     autopilot: Autopilot,
-    altitude_m: float,
+    ascent: Ascent,
     speed_m_s: float,
     ends: Ends | None = None,
-    outbound: Sequence[Point] = (),
-    homebound: Sequence[Point] = (),
-) -> tuple[MissionItem, ...]:
-    """Return the items of a flight.
+    triggers: Sequence[Trigger] = (),
+) -> tuple[tuple[MissionItem, ...], tuple[int, ...]]:
+    """Return the items of a flight, and the indices of those that are only passed.
 
     Parameters
     ----------
-    stops : sequence of (longitude, latitude, hold)
+    visits : sequence of Visit
+        Stops, and the points passed on the way to the first one, between them and home from the last.
     home : tuple of float
     vehicle : Vehicle
     autopilot : Autopilot
-    altitude_m, speed_m_s : float
+    ascent : Ascent
+    speed_m_s : float
     ends : Ends, optional
         Of what circles, see `ends_of`.
-    outbound, homebound : sequences of (longitude, latitude)
-        Points passed on the way to the first stop and home from the last, round what is kept out of.
+    triggers : sequence of Trigger
+        Switched on and off at the stops that are waited at; a camera after the first stop and after the last.
     """
     radius_m = vehicle.acceptance_radius_m
     if not autopilot.waypoint_radius:
         # ArduCopter does not store a radius, ArduRover neither; ArduPlane does.
         radius_m = min(radius_m, MOST_ARDUPILOT_RADIUS_M) if vehicle.circles else 0.0
 
-    def passed(point: Point) -> MissionItem:
-        return waypoint(*point, altitude_m, 0.0, radius_m, autopilot)
-
-    def visited(lon_deg: float, lat_deg: float, hold_s: float) -> MissionItem:
-        if vehicle.circles and hold_s > 0:
-            return loiter(lon_deg, lat_deg, altitude_m, hold_s, vehicle.turn_radius_m, autopilot)
-        return waypoint(lon_deg, lat_deg, altitude_m, hold_s, radius_m, autopilot)
+    def visited(visit: Visit) -> MissionItem:
+        if vehicle.circles and visit.hold_s > 0:
+            return loiter(*visit.place, visit.altitude_m, visit.hold_s, vehicle.turn_radius_m, autopilot)
+        return waypoint(*visit.place, visit.altitude_m, visit.hold_s, radius_m, autopilot)
 
     speed = change_speed(speed_m_s, AIR_SPEED if vehicle.circles else GROUND_SPEED)
-    survey = (*map(passed, outbound), *(visited(*stop) for stop in stops), *map(passed, homebound))
+    before, after = _around(home, vehicle, autopilot, ascent, ends)
+    over_home = () if vehicle.circles else (visited(Visit(*home, ascent.home_m, stop=False)),)
+    survey: list[MissionItem] = []
+    passing: list[int] = []
+    switched = [one for one in triggers if one.kind != CAMERA]
+    along = [one for one in triggers if one.kind == CAMERA]
+    stop, last = 0, sum(visit.stop for visit in visits)
+    for visit in visits:
+        stop += visit.stop
+        if not visit.stop:
+            passing.append(len(before) + 1 + len(survey))
+        if switched and visit.stop and visit.hold_s > 0:
+            arrival = visited(replace(visit, hold_s=0.0))
+            survey += [arrival, *(one.item(on=True, stop=stop) for one in switched)]
+            survey += [visited(visit), *(one.item(on=False, stop=stop) for one in switched)]
+        else:
+            survey.append(visited(visit))
+        if visit.stop and stop in (1, last):
+            survey += [one.item(on=stop < last, stop=stop) for one in along]
+    return (*before, speed, *survey, *over_home, *after), tuple(passing)
+
+
+def _around(
+    home: Point, vehicle: Vehicle, autopilot: Autopilot, ascent: Ascent, ends: Ends | None
+) -> tuple[tuple[MissionItem, ...], tuple[MissionItem, ...]]:
+    """Return the items before and after what is flown at the flight's height."""
     if not vehicle.flies:
-        return (speed, *survey, passed(home))
+        return (), ()
     if not vehicle.circles:
-        return (take_off(*home, altitude_m, autopilot), speed, *survey, passed(home), land(*home, autopilot))
+        return (take_off(*home, ascent.take_off_m, autopilot),), (land(*home, autopilot),)
     assert ends is not None
-    circle = loiter_to_altitude(*ends.circle, approach_up_m(altitude_m), vehicle.turn_radius_m)
+    circle = loiter_to_altitude(*ends.circle, ascent.circle_m, vehicle.turn_radius_m)
     if vehicle.lifts:
-        first = take_off(*home, altitude_m, autopilot, command=NAV_VTOL_TAKEOFF)
+        first = take_off(*home, ascent.take_off_m, autopilot, command=NAV_VTOL_TAKEOFF)
         last = land(*home, autopilot, command=NAV_VTOL_LAND)
     else:
         pitch_deg = 0.0 if autopilot.waypoint_radius else TAKE_OFF_PITCH_DEG
-        first = take_off(*ends.climb_out, altitude_m, autopilot, pitch_deg=pitch_deg)
+        first = take_off(*ends.climb_out, ascent.take_off_m, autopilot, pitch_deg=pitch_deg)
         last = land(*home, autopilot)
-    return (first, speed, *survey, land_start(), circle, last)
+    return (first,), (land_start(), circle, last)
 
 
 def ends_of(

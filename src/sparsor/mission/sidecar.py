@@ -41,7 +41,7 @@ class Sidecar:
     stops : array of int64 (n,)
         Planned cells in flight order.
     altitude_m, hold_s : float
-        Height above home and the longest dwell time at a stop.
+        Height above home, or above the ground, and the longest dwell time at a stop.
     home : tuple of float
         Longitude, latitude (degrees) and altitude above mean sea level (m) of home.
     home_altitude_known : bool
@@ -55,7 +55,7 @@ class Sidecar:
     sensor : SensorProfile or None
         What will measure, when that was said.
     passing : tuple of (longitude, latitude)
-        Waypoints that only lead past a keep-out and are no stops.
+        Waypoints that only lead past a keep-out or over terrain and are no stops.
     kept_out : array of bool (N,) or None
         Cells inside the area that are not flown to, since they lie in a keep-out or its margin; None: nothing was
         said of them, in a sidecar of an earlier version.
@@ -63,6 +63,11 @@ class Sidecar:
         Of a resumed mission: stops that earlier flights measured already, in their flight order.
     heights_m : tuple of float
         Above home, of vehicles at once that fly each at their own; `altitude_m` is the lowest of them.
+    above_ground : bool
+        Whether `altitude_m` is above the ground, which `way` then follows.
+    way : array of float64 (n, 3)
+        Longitude, latitude (degrees) and height above home (m) of what is flown, where the height is not the same
+        everywhere; else empty.
     """
 
     name: str
@@ -83,6 +88,8 @@ class Sidecar:
     kept_out: NDArray[np.bool_] | None = None
     flown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     heights_m: tuple[float, ...] = ()
+    above_ground: bool = False
+    way: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
 def sidecar_npz(sidecar: Sidecar) -> bytes:
@@ -104,6 +111,9 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
         about["passing"] = [list(place) for place in sidecar.passing]
     if sidecar.heights_m:
         about["heights_m"] = list(sidecar.heights_m)
+    if sidecar.above_ground:
+        about["above_ground"] = True
+        about["way"] = sidecar.way.tolist()
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(
@@ -181,4 +191,6 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         kept_out=None if kept_out is None else kept_out.astype(np.bool_),
         flown=flown,
         heights_m=tuple(float(height_m) for height_m in about.get("heights_m", ())),
+        above_ground=bool(about.get("above_ground", False)),
+        way=np.array(about.get("way", []), dtype=np.float64).reshape(-1, 3),
     )

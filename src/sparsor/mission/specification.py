@@ -20,7 +20,8 @@ from pydantic import (
 )
 
 from sparsor.errors import MissionError, VehicleError
-from sparsor.vehicle import CALM, SteadyWind, load_vehicle
+from sparsor.mission.triggers import Trigger, parse_trigger
+from sparsor.vehicle import CALM, SteadyWind, load_sensor, load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,6 +37,7 @@ PAPER_ROWS, PAPER_PROBABILITY, PAPER_THETA = 35, 0.03, 3
 ALGORITHM_1_ITERATIONS = 4000
 DEFAULT_BUDGET = "10%"
 ALTITUDE_M, HOLD_S = 50.0, 5.0
+AUTO = "auto"  # a hold that follows the sensor; a number once it is known
 _NO_BUDGET = {"paper", "lambda_path", "probability", "theta"}  # turn the default budget off
 # Settings that only Algorithm 1 knows: who gives one asks for it.
 _ALGORITHM_1 = frozenset(
@@ -177,6 +179,9 @@ class FlightSection(_Section):
     drop_unreachable: bool = False
     vehicles: Annotated[int, Field(ge=1, le=8)] = 1
     separation_m: Annotated[FiniteFloat, Field(ge=1, le=1000)] = 10.0
+    terrain: Path | None = None
+    terrain_tolerance_m: Annotated[FiniteFloat, Field(gt=0, le=1000)] | None = None
+    trigger: tuple[str, ...] | None = None
 
     @field_validator("wind")
     @classmethod
@@ -199,6 +204,8 @@ class FlightSection(_Section):
             raise ValueError("--drop-unreachable goes with sorties: leave out --no-sorties (sorties = false)")
         if self.vehicles > 1 and not self.sorties:
             raise ValueError("--vehicles goes with sorties: leave out --no-sorties (sorties = false)")
+        if self.vehicles > 1 and self.terrain is not None:
+            raise ValueError("--vehicles is not planned over a --terrain: give one of them")
         if self.vehicles > 1 and len(self.given_homes) not in (0, 1, self.vehicles):
             raise ValueError(
                 f"{self.vehicles} vehicles and {len(self.given_homes)} homes: give one home, beside which places are "
@@ -210,6 +217,29 @@ class FlightSection(_Section):
     def given_homes(self) -> tuple[tuple[float, float], ...]:
         """The homes that were given; none where the route's first stop is to be home."""
         return self.homes if self.home is None else (self.home,)
+
+    @field_validator("trigger")
+    @classmethod
+    def _can_be_switched(cls, trigger: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        for one in trigger or ():
+            parse_trigger(one)
+        return trigger
+
+    @property
+    def triggers(self) -> tuple[Trigger, ...]:
+        """What is switched at the stops."""
+        return tuple(parse_trigger(one) for one in self.trigger or ())
+
+    @model_validator(mode="after")
+    def _tolerance_of_a_terrain(self) -> Self:
+        if self.terrain_tolerance_m is not None and self.terrain is None:
+            raise ValueError("--terrain-tolerance only makes sense with --terrain")
+        if self.terrain_tolerance_m is not None and self.terrain_tolerance_m >= self.altitude_m:
+            raise ValueError(
+                f"a terrain tolerance of {self.terrain_tolerance_m:g} m for a flight {self.altitude_m:g} m above the "
+                "ground; it has to be below the height"
+            )
+        return self
 
     @property
     def steady_wind(self) -> SteadyWind:
@@ -282,7 +312,15 @@ class MissionSpecification(_Section):
         sensor = None if self.sensor is None else self.sensor.profile
         profiles = [Path(one) for one in (self.flight.vehicle, sensor) if one is not None and one.endswith(".toml")]
         coast = None if self.coast is None else self.coast.file
-        paths = (self.area.file, coast, self.prior.field, self.prior.model, *self.flight.keep_out, *profiles)
+        paths = (
+            self.area.file,
+            coast,
+            self.prior.field,
+            self.prior.model,
+            self.flight.terrain,
+            *self.flight.keep_out,
+            *profiles,
+        )
         before = self.resume
         flown = () if before is None else (before.mission / "mission.toml", *before.logs, before.calibration)
         return tuple(path for path in (*paths, *flown) if path is not None)
@@ -316,12 +354,31 @@ def specification(data: dict[str, Any], *, base: Path) -> MissionSpecification:
     MissionError
         Names each key that is wrong, its value and what is allowed.
     """
+    by_the_sensor = (data.get("flight") or {}).get("hold_s") == AUTO
+    if by_the_sensor:
+        data = {**data, "flight": {**data["flight"], "hold_s": 0.0}}
     try:
         spec = MissionSpecification.model_validate(_without_none(data))
     except ValidationError as error:
         raise MissionError(_explain(error)) from None
     spec = _with_paths(spec, lambda path: Path(os.path.normpath(base / path)))
+    if by_the_sensor:
+        spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"hold_s": _dwell_s(spec)})})
     return _as_its_vehicle_moves(spec, data.get("flight") or {})
+
+
+def _dwell_s(spec: MissionSpecification) -> float:
+    """Return how long a stop of Algorithm 1 is dwelt at so that its sensor answers to 95 %, seconds."""
+    if spec.search.planner == "refined":
+        raise MissionError(
+            "--hold auto is of Algorithm 1 (--planner monte-carlo): the refined planner places its dwells by the "
+            "sensor's response already, and --hold is the length of one; give seconds, or leave it out"
+        )
+    if spec.sensor is None:
+        raise MissionError("--hold auto follows the sensor's response: say which one with --t90 or --sensor-profile")
+    if spec.sensor.profile is not None:
+        return load_sensor(spec.sensor.profile).dwell_s
+    return load_sensor().model_copy(update={"t90_s": spec.sensor.t90_s}).dwell_s
 
 
 def _as_its_vehicle_moves(spec: MissionSpecification, given: Mapping[str, object]) -> MissionSpecification:
@@ -417,7 +474,7 @@ def _with_paths(spec: MissionSpecification, change: Any) -> MissionSpecification
     flight = spec.flight
     if flight.vehicle.endswith(".toml"):
         flight = flight.model_copy(update={"vehicle": change(Path(flight.vehicle)).as_posix()})
-    flight = flight.model_copy(update={"keep_out": tuple(change(path) for path in flight.keep_out)})
+    flight = moved(flight.model_copy(update={"keep_out": tuple(change(path) for path in flight.keep_out)}), "terrain")
     sensor = spec.sensor
     if sensor is not None and sensor.profile is not None and sensor.profile.endswith(".toml"):
         sensor = sensor.model_copy(update={"profile": change(Path(sensor.profile)).as_posix()})

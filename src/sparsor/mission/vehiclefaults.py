@@ -23,7 +23,7 @@ ROUNDING_S = 1.0  # positions are rounded to a centimetre, holds to what the aut
 
 
 def check_faults(
-    plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM, *, study: bool = False
+    plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM, *, study: bool = False, over_terrain: bool = False
 ) -> tuple[Fault, ...]:
     """Return all that is noticed about a plan: by itself, and on the vehicle that is to fly it.
 
@@ -34,17 +34,22 @@ def check_faults(
     wind : SteadyWind
     study : bool
         Whether it is known to be a planning study: what says that it cannot be flown by endurance is then a warning.
+    over_terrain : bool
+        Whether its heights are checked against the ground, so that those above home say nothing.
     """
-    return (*judged_faults(plan), *vehicle_faults(plan, vehicle, wind, study=study))
+    return (
+        *judged_faults(plan, over_terrain=over_terrain),
+        *vehicle_faults(plan, vehicle, wind, study=study, over_terrain=over_terrain),
+    )
 
 
 def vehicle_faults(
-    plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM, *, study: bool = False
+    plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind = CALM, *, study: bool = False, over_terrain: bool = False
 ) -> tuple[Fault, ...]:
     """Return what is noticed about a plan on a vehicle; parameters as `check_faults`."""
     return (
         *_kind(plan, vehicle),
-        *_heights(plan, vehicle),
+        *(() if over_terrain else _heights(plan, vehicle)),
         *_counts(plan, vehicle),
         *_time(plan, vehicle, wind, study),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
@@ -56,6 +57,11 @@ class SensorProfile(Profile):
         if self.range is not None and not self.range[0] < self.range[1]:
             raise ValueError(f"range is [{self.range[0]:g}, {self.range[1]:g}]; give the lower end first")
         return self
+
+    @property
+    def dwell_s(self) -> float:
+        """Time to 95 % of a step, up to whole seconds: ``t90 ln(20) / ln(10)`` of a first-order answer."""
+        return float(math.ceil(round(self.t90_s * math.log(20.0) / math.log(10.0), 6)))
 
     @property
     def words(self) -> str:

@@ -10,6 +10,10 @@ from sparsor.link.missions.wire import FENCE, KINDS, MISSION, RALLY
 from sparsor.mission.describe import command_name
 from sparsor.mission.items import (
     DO_CHANGE_SPEED,
+    DO_SEND_SCRIPT_MESSAGE,
+    DO_SET_CAM_TRIGG_DIST,
+    DO_SET_RELAY,
+    DO_SET_SERVO,
     FRAME_GLOBAL,
     FRAME_MISSION,
     NAV_DELAY,
@@ -29,7 +33,13 @@ ALTITUDE_M: Final = {MISSION: 0.011, FENCE: math.inf, RALLY: 1.0}  # ArduPilot k
 # ArduPilot reads back the direction in which a plane turns to land, whatever was sent.
 MEANINGLESS: Final = {NAV_LAND: {3}}
 # Parameters that make the flight another one when they change, by command.
-ESSENTIAL: Final = {command: {0} for command in (*WAYPOINTS, NAV_LOITER_TIME, NAV_DELAY)} | {DO_CHANGE_SPEED: {0, 1}}
+ESSENTIAL: Final = {command: {0} for command in (*WAYPOINTS, NAV_LOITER_TIME, NAV_DELAY)} | {
+    DO_CHANGE_SPEED: {0, 1},
+    DO_SET_SERVO: {0, 1},
+    DO_SET_RELAY: {0, 1},
+    DO_SET_CAM_TRIGG_DIST: {0},
+    DO_SEND_SCRIPT_MESSAGE: {0, 1, 2, 3},
+}
 
 
 @dataclass(frozen=True)

@@ -176,5 +176,6 @@ class Motion:
         change = vehicle.acceleration_m_s2 * dt_s
         self.up_m_s += min(max(want - self.up_m_s, -change), change)
         self.up_m += self.up_m_s * dt_s
-        if self.up_m <= 0.0:
+        # The ground is level, but for a vehicle that is sent below home: it may be over a valley.
+        if self.up_m <= 0.0 and (aim.landing or aim.up_m >= 0.0):
             self.up_m, self.up_m_s = 0.0, max(self.up_m_s, 0.0)

@@ -1,7 +1,8 @@
 """Following an uploaded mission, item by item.
 
 Flown: take-offs, waypoints, loiters, delays, landings, return to launch, jumps and changes of the ground speed. A
-loiter of some turns is waited out at its centre, as long as ArduPilot circles (CIRCLE_RATE). From the ground, a
+loiter of some turns is waited out at its centre, as long as ArduPilot circles (CIRCLE_RATE). A leg between two heights
+is a straight line, on which a multirotor goes no faster than it climbs or sinks. From the ground, a
 waypoint begins with a vertical take-off to its height, as in PX4. Everything else (CONDITION_*, cameras, servos, a
 delay until a time of the day) is passed over at once.
 """
@@ -80,6 +81,7 @@ class Navigator:
         self._arrived_s: float | None = None
         self._jumps: dict[int, int] = {}
         self._start: tuple[float, float] | None = None
+        self._start_up_m = 0.0
         self._lift_m: float | None = None
 
     @property
@@ -107,7 +109,7 @@ class Navigator:
                 self._do(item)
                 continue
             if self._start is None:
-                self._start = (motion.east_m, motion.north_m)
+                self._start, self._start_up_m = (motion.east_m, motion.north_m), motion.up_m
                 self._lift_m = self._height_to_lift_to(item) if landed and self._vehicle.flies else None
             if self._lift_m is not None and motion.up_m < self._lift_m - 0.5 * HEIGHT_M:
                 return Aim(*self._start, self._lift_m, self.speed_m_s), reached
@@ -156,7 +158,21 @@ class Navigator:
             over = motion.distance_m(*target[:2]) < HEIGHT_M and motion.ground_speed_m_s < 0.5
             self._arrived_s = 0.0 if over or self._arrived_s is not None else None
             return Aim(target[0], target[1], motion.up_m, self.speed_m_s, landing=self._arrived_s is not None)
-        return Aim(*target, self.speed_m_s, self._passing_m_s(item, target, motion))
+        up_m, most_m_s = self._on_the_line(target, motion)
+        passing_m_s = min(self._passing_m_s(item, target, motion), most_m_s)
+        return Aim(*target[:2], up_m, most_m_s, passing_m_s)
+
+    def _on_the_line(self, target: tuple[float, float, float], motion: Motion) -> tuple[float, float]:
+        """Return the height on the straight line to a target, and the speed at which a multirotor keeps to it."""
+        assert self._start is not None
+        length_m = math.dist(self._start, target[:2])
+        rise_m = target[2] - self._start_up_m
+        if length_m < HEIGHT_M or abs(rise_m) < HEIGHT_M:
+            return target[2], self.speed_m_s
+        share = 1.0 - min(motion.distance_m(*target[:2]) / length_m, 1.0)
+        rate_m_s = self._vehicle.climb_m_s if rise_m > 0 else self._vehicle.descent_m_s
+        keeps_m_s = self.speed_m_s if self._vehicle.circles else rate_m_s * length_m / abs(rise_m)
+        return self._start_up_m + share * rise_m, min(self.speed_m_s, keeps_m_s)
 
     def _done(self, item: StoredItem, motion: Motion, now_s: float, *, landed: bool) -> bool:
         if item.command in LANDINGS:
@@ -183,6 +199,8 @@ class Navigator:
             return 0.0
         following = self.target(after)
         if following is None or self.items[after].command != NAV_WAYPOINT:
+            return 0.0
+        if math.dist(following[:2], target[:2]) < HEIGHT_M:  # it waits in the same place
             return 0.0
         course = math.atan2(target[0] - motion.east_m, target[1] - motion.north_m)
         turn = math.atan2(following[0] - target[0], following[1] - target[1]) - course
