@@ -59,7 +59,7 @@ def made(tmp_path_factory, cache):
         "name": "doha",
         "area": {"bbox": (51.50, 25.27, 51.53, 25.30)},
         "search": {"planner": "monte-carlo", "iterations": 30, "budget": "15%"},  # of no sensor that it knows
-        "flight": {"altitude_m": HEIGHT_M},
+        "flight": {"altitude_m": HEIGHT_M, "sorties": False},
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SPARSOR_CACHE_DIR", str(cache))

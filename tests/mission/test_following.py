@@ -198,7 +198,7 @@ def test_too_many_items_are_an_error_that_says_what_helps(tmp_path: Any) -> None
     rough = Hills(np.random.default_rng(0).uniform(0, 60, (330, 330)))
     terrain = terrain_of(write_dem(tmp_path / "rough.tif", rough))
     stops = np.random.default_rng(1).uniform((51.505, 25.275), (51.53, 25.3), (40, 2))
-    with pytest.raises(MissionError, match=r"waypoints between them.*a larger --terrain-tolerance"):
+    with pytest.raises(MissionError, match=r"over terrain.*too many.*a larger --terrain-tolerance"):
         over(Ground(terrain, 50.0, 2.0), stops)
 
 

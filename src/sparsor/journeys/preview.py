@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sparsor.geodesy.barred import Barred
     from sparsor.journeys.planning import PlannedMission
     from sparsor.journeys.preparing import Place
+    from sparsor.mission import MissionPlan
     from sparsor.mission.specification import MissionSpecification
 
 LONGEST_NAME = 18  # that the legend has room for
@@ -28,7 +29,7 @@ LONGEST_NAME = 18  # that the legend has room for
 def preview_png(mission: PlannedMission) -> bytes:
     """Return ``preview.png`` of a mission."""
     place, plan = mission.place, mission.plans[0]
-    stops = np.array([[stop.lon_deg, stop.lat_deg] for one in mission.plans for stop in one.stops])
+    stops = np.concatenate(list(map(_stops, mission.plans)))
     home = np.array([plan.home.lon_deg, plan.home.lat_deg])
     prior, label = _prior_map(mission)
     return mission_preview(
@@ -43,6 +44,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             prior_unit=mission.prior.model.unit,
             stops=stops,
             route=stops if mission.sorties is None else None,
+            sorties=() if mission.sorties is None else tuple(map(_stops, mission.plans)),
             transits=_ways(mission),
             home=(float(home[0]), float(home[1])),
             fence=_fence(mission),
@@ -108,15 +110,13 @@ def _fence(mission: PlannedMission) -> NDArray[np.float64]:
     return np.asarray(hull, dtype=np.float64)
 
 
+def _stops(plan: MissionPlan) -> NDArray[np.float64]:
+    return np.array([[stop.lon_deg, stop.lat_deg] for stop in plan.stops])
+
+
 def _ways(mission: PlannedMission) -> tuple[NDArray[np.float64], ...]:
-    """Return the ways from and to home; of sorties each whole flight."""
-    if mission.sorties is None:
-        return tuple(np.array(way) for way in transits(mission.plan))
-    flights = []
-    for plan in mission.plans:
-        out, back = transits(plan)
-        flights.append(np.array([*out, *((stop.lon_deg, stop.lat_deg) for stop in plan.stops[1:]), *back[1:]]))
-    return tuple(flights)
+    """Return the ways from and to home, of each sortie."""
+    return tuple(np.array(way) for plan in mission.plans for way in transits(plan))
 
 
 def _prior_map(mission: PlannedMission) -> tuple[NDArray[np.float64], str]:
@@ -152,8 +152,14 @@ def _caption(mission: PlannedMission) -> tuple[str, ...]:
         f"{found.stops.size} stops, {mission.path_length_m / 1000:.1f} km over the stops "
         f"({mission.coverage_fraction:.1%} of full coverage), "
         f"{mission.specification.flight.altitude_m:g} m above {'home' if mission.ground is None else 'the ground'}.",
-        f"{mission.flight_time_s / 60:.0f} min in the air; {mission.vehicle.name}: {mission.usable_s / 60:.0f} min "
+        f"{_minutes(mission)} min in the air; {mission.vehicle.name}: {mission.usable_s / 60:.0f} min "
         f"less its reserve{'' if mission.flyable else ' - a planning study, not flyable'}.",
         f"Expected error {mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|).",
         "Nothing here says that the flight is legal or safe.",
     )
+
+
+def _minutes(mission: PlannedMission) -> str:
+    times = [mission.flight_time_s] if mission.sorties is None else [time.seconds for time in mission.sorties.times]
+    *before, last = [f"{seconds / 60:.0f}" for seconds in times]
+    return f"{', '.join(before)} and {last}" if before else last

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sparsor.plot import style
-from sparsor.plot.route import HOUSE, numbered_stops
+from sparsor.plot.route import HOUSE, numbered_stops, sortie_style
 from sparsor.plot.scales import length_label
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def legend_entries(
     entries: list[tuple[Handle, str]] = []
     if picture.route is not None:
         entries.append((_line(style.ROUTE_CASING, style.ROUTE), "route"))
+    entries += _sortie_entries(len(picture.sorties))
     if picture.stops is not None:
         entries.append((_line(style.NUMBERED_STOP), _stops_label(view, picture)))
     if picture.transits:
@@ -50,6 +51,17 @@ def legend_entries(
     if coast:
         entries.append((_line({**style.COAST, "linewidth": 0.75}), picture.coast_label))
     return [handle for handle, _ in entries], [label for _, label in entries]
+
+
+def _sortie_entries(count: int) -> list[tuple[Handle, str]]:
+    """Return one entry a sortie, or a colour, where there are more sorties than colours."""
+    colours = len(style.SORTIES)
+    entries: list[tuple[Handle, str]] = []
+    for first in range(min(count, colours)):
+        numbers = [str(number + 1) for number in range(first, count, colours)]
+        words = "sortie" if len(numbers) == 1 else "sorties"
+        entries.append((_line(style.ROUTE_CASING, sortie_style(first)), f"{words} {', '.join(numbers)}"))
+    return entries
 
 
 def _line(*layers: style.Style) -> Handle:

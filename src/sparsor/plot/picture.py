@@ -36,8 +36,10 @@ class MissionPicture:
         Where the vehicle stops, in flight order.
     route : array (n, 2)
         The path over the stops.
+    sorties : tuple of arrays (n, 2)
+        Instead of a route, the paths of several flights over their stops.
     transits : tuple of arrays (n, 2)
-        The ways from home to the route and back.
+        The ways from home to the route, or to each sortie's, and back.
     home : tuple of float, optional
         Longitude and latitude.
     fence : array (n, 2), optional
@@ -73,6 +75,7 @@ class MissionPicture:
     prior_unit: str = ""
     stops: NDArray[np.float64] | None = None
     route: NDArray[np.float64] | None = None
+    sorties: tuple[NDArray[np.float64], ...] = ()
     transits: tuple[NDArray[np.float64], ...] = ()
     home: tuple[float, float] | None = None
     fence: NDArray[np.float64] | None = None
@@ -101,6 +104,7 @@ class MissionPicture:
         Keep-outs, margins and the coast are shown as far as they reach into it.
         """
         named = [("stops", self.stops), ("route", self.route), ("fence", self.fence)]
+        named += [("sorties", points) for points in self.sorties]
         named += [("transits", points) for points in self.transits]
         named += [("area", points) for points in self.area]
         named += [("home", None if self.home is None else np.array([self.home], dtype=np.float64))]

@@ -8,7 +8,7 @@ from sparsor.plot import furniture, ground
 from sparsor.plot.layout import layout_of
 from sparsor.plot.legend import legend_entries
 from sparsor.plot.page import map_axes, page_png
-from sparsor.plot.route import draw_home, draw_route, draw_stops, draw_transit
+from sparsor.plot.route import draw_home, draw_route, draw_stops, draw_transit, sortie_style
 from sparsor.plot.view import view_of
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def _draw_flight(axes: Axes, view: View, picture: MissionPicture) -> None:
         draw_transit(axes, view, transit)
     if picture.route is not None and len(picture.route):
         draw_route(axes, view, picture.route)
+    for number, sortie in enumerate(picture.sorties):
+        draw_route(axes, view, sortie, sortie_style(number))
     if picture.stops is not None and len(picture.stops):
         draw_stops(axes, view, picture.stops)
     if picture.home is not None:

@@ -33,13 +33,18 @@ HOUSE = (
 ARROW = ((0.0, 0.6), (0.42, -0.45), (0.0, -0.22), (-0.42, -0.45), (0.0, 0.6))
 
 
-def draw_route(axes: Axes, view: View, route: NDArray[np.float64]) -> None:
+def draw_route(axes: Axes, view: View, route: NDArray[np.float64], how: style.Style = style.ROUTE) -> None:
     """Draw the path over the stops, with arrows in its direction."""
     lon, lat = view.unwrapped(route).T
     axes.plot(lon, lat, **style.ROUTE_CASING)
-    axes.plot(lon, lat, **style.ROUTE)
+    axes.plot(lon, lat, **how)
     for place, angle_deg in arrows(view.inches(route)):
         draw_symbol(axes, view, place, ARROW, style.ARROW, turned_deg=angle_deg)
+
+
+def sortie_style(number: int) -> style.Style:
+    """Return how the path of a sortie is drawn, counted from 0."""
+    return {**style.ROUTE, "color": style.SORTIES[number % len(style.SORTIES)]}
 
 
 def draw_transit(axes: Axes, view: View, transit: NDArray[np.float64]) -> None:

@@ -21,6 +21,8 @@ NO_VALUE = "#c8c8c8"
 
 ROUTE_CASING: Style = {"color": INK, "linewidth": 2.3, "solid_joinstyle": "round", "zorder": 5}
 ROUTE: Style = {"color": "white", "linewidth": 1.2, "solid_joinstyle": "round", "zorder": 5.1}
+# Of sorties, in turn: Okabe and Ito's that stand out on the colour map, white first.
+SORTIES = ("white", "#e69f00", "#cc79a7", "#56b4e9")
 ARROW: Style = {
     "markersize": 7,
     "markerfacecolor": "white",
