@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # Okabe and Ito's; with the markers no line is told by its colour alone.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#1a1a1a", "#e69f00", "#56b4e9", "#7f7f7f")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+_LINES = ("-", "--", ":")
 _PANEL_IN, _PANEL_HEIGHT_IN, _LEAST_WIDTH_IN = 4.4, 3.9, 6.0
 _LEFT_IN, _BELOW_IN, _ABOVE_IN, _HEAD_IN = 0.75, 0.55, 0.3, 0.45
 _LEGEND_LINE_IN, _LINE_IN = 0.19, 0.14
@@ -117,7 +118,18 @@ def _draw(axes: Axes, panel: Panel, labels: list[str]) -> None:
         look = labels.index(one.label)
         colour = _COLOURS[look % len(_COLOURS)]
         marker = _MARKERS[look % len(_MARKERS)]
-        axes.plot(one.across, one.up, color=colour, marker=marker, markersize=4.5, linewidth=1.3, label=one.label)
+        again = look // len(_COLOURS)  # after the last colour from the first one, dashed and with open markers
+        axes.plot(
+            one.across,
+            one.up,
+            color=colour,
+            linestyle=_LINES[again % len(_LINES)],
+            marker=marker,
+            markersize=4.5,
+            markerfacecolor="white" if again else colour,
+            linewidth=1.3,
+            label=one.label,
+        )
         if one.spread is not None:
             low = [up - by for up, by in zip(one.up, one.spread, strict=True)]
             high = [up + by for up, by in zip(one.up, one.spread, strict=True)]
