@@ -253,6 +253,23 @@ def test_other_budgets_are_compared_and_the_plan_stays_the_same(console):
     assert not Path("missions/m/pareto.csv").exists()
 
 
+def test_another_budget_that_no_mission_can_be_made_for_is_left_out(console, monkeypatch):
+    from sparsor.errors import MissionError
+    from sparsor.journeys import pareto
+
+    plan = pareto.plan_prepared
+
+    def fails(spec, *rest, **more):
+        if spec.search.budget not in ("10%", "8%"):
+            raise MissionError("no stop is waited at")
+        return plan(spec, *rest, **more)
+
+    monkeypatch.setattr(pareto, "plan_prepared", fails)
+    ran = console.mission("--name", "m", "--pareto", "--json")
+    assert ran.code == 0, ran.err
+    assert [one["budget"] for one in ran.result["pareto"]] == ["8%", "10%"]
+
+
 def test_without_a_budget_there_is_nothing_to_compare(console, tree):
     ran = console.mission("--pareto", "--lambda-path", 0.01)
     assert (ran.code, "--budget" in ran.err) == (2, True)

@@ -171,6 +171,30 @@ def test_where_all_was_flown_nothing_is_planned(here, tree):
     assert tree() == before
 
 
+def test_a_budget_in_per_cent_is_of_what_may_be_flown_to(here):
+    keep_out = Path(__file__).parents[2] / "geo" / "keep-out-example.geojson"
+    words = ("--bbox", *BOX, "--name", "past", "--keep-out", keep_out, "--t90", 0)
+    assert here("generate-mission", *words, *SOON).code == 0
+    flight(Path("missions/past/past.plan"), Path("past.csv"), part=0.4)
+    told = resumed(here, log="past.csv", mission="missions/past")["resumed"]
+    old = read_sidecar(Path("missions/past/past.npz"))
+    assert old.kept_out.any()
+    total_m = 0.1 * old.grid.full_coverage_m(old.allowed & ~old.kept_out)
+    assert told["path_length_m"] + parse_budget(told["budget"]).value == pytest.approx(total_m, abs=0.1)
+    asked = tomllib.loads(Path("missions/past-2/mission.toml").read_text(encoding="utf-8"))
+    assert (
+        asked["flight"]["keep_out"]
+        == tomllib.loads(Path("missions/past/mission.toml").read_text(encoding="utf-8"))["flight"]["keep_out"]
+    )
+
+
+def test_several_homes_in_the_place_of_the_first_stop(here):
+    result = resumed(here, "--home", 51.504, 25.2815, "--home", 51.52, 25.275, "-o", "rest")
+    assert result["plans"] == ["rest/rest.plan"]
+    asked = tomllib.loads(Path("rest/mission.toml").read_text(encoding="utf-8"))
+    assert asked["flight"]["homes"] == [[51.504, 25.2815], [51.52, 25.275]]
+
+
 MISTAKES = {
     "no mission": ("--resume doha.csv", "give its folder (--mission DIR)"),
     "no log": ("--mission missions/doha", "--mission only makes sense with --resume LOG"),
@@ -180,6 +204,7 @@ MISTAKES = {
         "--resume doha.csv --mission missions/doha --field f.tif --altitude 30 --rows 9 --pareto",
         "--field, --rows, --altitude, --pareto: not with a mission",
     ),
+    "a terrain": ("--resume doha.csv --mission missions/doha --terrain dem.tif", "--terrain: not with a mission"),
     "the other planner": (
         "--resume doha.csv --mission missions/doha --planner monte-carlo",
         "--planner: not with a mission",

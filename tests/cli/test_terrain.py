@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sparsor.mission import read_plan
@@ -134,6 +135,40 @@ def test_sorties_follow_the_ground_too(console, dem, tmp_path):
     sidecar = read_sidecar(tmp_path / "missions/m/m.npz")
     waypoints = [item for path in ran.result["plans"] for item in read_plan(Path(path)).items if item.command == 16]
     assert len(sidecar.way) == len(waypoints)
+
+
+def test_sorties_from_homes_at_different_heights(console, dem, tmp_path):
+    homes = [(51.495, 25.265), (51.536, 25.306)]  # the second outside of the box and what lies round it
+    ran = console.mission(
+        "--name", "m", "--terrain", dem, "--budget", "25km", "--json",
+        *(word for home in homes for word in ("--home", *home)), iterations=100,
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    plans = [read_plan(Path(path)) for path in ran.result["plans"]]
+    over, said = ran.result["terrain"], " ".join(ran.result["warnings"])
+    places = dict.fromkeys((plan.home.lon_deg, plan.home.lat_deg) for plan in plans)
+    assert len(places) == 2
+    assert over["homes_m"] == pytest.approx([float(HILLS.at(*place)) for place in places], abs=0.01)
+    rally_m = max(plan.rally_points[0].altitude_m for plan in plans)
+    assert over["return_m"] == rally_m
+    assert f"{rally_m:g} m or more, as the highest rally point" in said
+    assert "take off from the home of the plan that is flown" in said
+    up_m = [item.altitude_m for plan in plans for item in plan.items if item.command == 16]
+    assert over["highest_m"] == pytest.approx(max(up_m), abs=0.01)
+    way = read_sidecar(tmp_path / "missions/m/m.npz").way
+    assert way[~np.isnan(way[:, 0]), 2].tolist() == up_m
+    assert np.isnan(way[:, 0]).any()
+    assert console("sparsor", "check", tmp_path / "missions/m").code == 0
+
+
+def test_the_ground_is_read_where_a_way_past_a_keep_out_leaves_the_box(console, dem, tmp_path):
+    wall = [[51.49, 25.25], [51.497, 25.25], [51.497, 25.315], [51.49, 25.315], [51.49, 25.25]]
+    area = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [wall]}}
+    (tmp_path / "wall.geojson").write_text(json.dumps(area))
+    ran = console.mission(
+        "--name", "m", "--terrain", dem, "--budget", "8km", "--keep-out", "wall.geojson", "--home", 51.485, 25.285,
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
 
 
 def test_what_the_climbs_take_beyond_a_budget_of_time_is_told(console, tmp_path):

@@ -30,6 +30,17 @@ def test_they_are_planned_checked_and_remembered(console, tmp_path):
     assert (folder / "m.plan").read_bytes() == before
 
 
+def test_a_sortie_that_dwells_nowhere_switches_nothing(console):
+    words = ("--budget", "25km", "--trigger", "relay:0", "--trigger", "camera-distance:20", "--json")
+    ran = console.mission("--name", "m", *words, iterations=2000)
+    assert ran.code == 0, ran.err
+    plans = [read_plan(Path(path)) for path in ran.result["plans"]]
+    dwelt = [sum(stop.hold_s > 0 for stop in plan.stops) for plan in plans]
+    assert min(dwelt) == 0 < max(dwelt)
+    assert [sum(item.command == 181 for item in plan.items) for plan in plans] == [2 * count for count in dwelt]
+    assert [sum(item.command == 206 for item in plan.items) for plan in plans] == [2] * len(plans)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

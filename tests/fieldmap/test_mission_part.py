@@ -82,6 +82,17 @@ def over_hills(above_m=0.0):
     return samples, np.column_stack((lon, lat, np.interp(east[[0, 142, -1]], [0.1, 0.4, 0.9], [50.0, -20.0, 190.0])))
 
 
+def test_parts_of_a_way_are_above_homes_of_their_own():
+    samples, way = over_hills()
+    raised = way + np.array([0.0, 0.0, 60.0])
+    apart = np.full((1, 3), np.nan)
+    alone = mission_part(samples, GRID, 50.0, way).in_flight
+    assert np.array_equal(mission_part(samples, GRID, 50.0, np.concatenate((raised, apart, way))).in_flight, alone)
+    # What lies elsewhere tells nothing of the heights here.
+    elsewhere = raised + np.array([0.0, 1.0, 0.0])
+    assert np.array_equal(mission_part(samples, GRID, 50.0, np.concatenate((elsewhere, apart, way))).in_flight, alone)
+
+
 @pytest.mark.parametrize("altitude_m", [50.0, None])
 @pytest.mark.parametrize("from_home", [True, False])
 def test_a_way_over_hills_is_followed(altitude_m, from_home):

@@ -36,7 +36,7 @@ _FIXED = {
         "lambda_path": "--lambda-path",
         "lambda_incoh": "--lambda-incoh",
     },
-    "flight": {"altitude_m": "--altitude"},
+    "flight": {"altitude_m": "--altitude", "terrain": "--terrain", "terrain_tolerance_m": "--terrain-tolerance"},
 }
 
 

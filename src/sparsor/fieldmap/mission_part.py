@@ -24,6 +24,8 @@ BAND: Final = 0.2
 LEAST_BAND_M: Final = 2.0
 WAY_BAND_M: Final = 10.0
 """The same round a way whose height above the ground nobody knows."""
+SIDE_BY_SIDE_M: Final = 20.0
+"""As far beyond the nearest part of a way another one is as good: positions are no better, and legs cross."""
 OUTSIDE = -1
 _MODE_WIDTH_M = 4.0
 _AIRBORNE = 0.5  # above this share of the usual height nothing takes off or lands
@@ -70,8 +72,8 @@ def mission_part(
         was flown most is taken for the mission's height.
     way : array of float64 (k, 3), optional
         Longitude, latitude and height above home of what was to be flown, in order, where it is not at one height: over
-        terrain, say. The mission's height is then that of the nearest place on it, and `altitude_m` the height above
-        the ground.
+        terrain, say; a row of NaN parts what is above different homes. The mission's height is then that of the nearest
+        place on it, and `altitude_m` the height above the ground.
     heights_m : sequence of float
         Heights of several vehicles at once, each as good as the other; where only altitudes above the sea are known all
         above half of what was flown most counts.
@@ -125,7 +127,7 @@ def _along_the_way(
     from_home: bool,
 ) -> MissionPart:
     unknown = np.isnan(height_m)
-    above_m = height_m - heights_on(way, samples.lon_deg, samples.lat_deg)
+    above_m = _above_the_way(way, samples, height_m, from_home=from_home)
     if not from_home:  # above the sea: most of the log is the mission
         above_m = above_m - np.nanmedian(above_m)
     half_m = max(BAND * altitude_m, LEAST_BAND_M) if altitude_m is not None else WAY_BAND_M
@@ -140,6 +142,20 @@ def _along_the_way(
         f"above {low_m:g} m below them were taken"
     )
     return MissionPart(airborne, cell, (warning,))
+
+
+def _above_the_way(
+    way: NDArray[np.float64], samples: Samples, height_m: NDArray[np.float64], *, from_home: bool
+) -> NDArray[np.float64]:
+    """Return how far above the way samples are; where parts of it lie side by side, above that nearest in height."""
+    gaps = np.isnan(way[:, 0])
+    parts = [part[~np.isnan(part[:, 0])] for part in np.split(way, np.flatnonzero(gaps))]
+    on = [_nearest_on(part, samples.lon_deg, samples.lat_deg) for part in parts if np.isfinite(part[:, 0]).any()]
+    above_m = height_m - np.array([height for height, _ in on])
+    away_m = np.array([away for _, away in on])
+    beside = away_m <= away_m.min(axis=0) + (SIDE_BY_SIDE_M if from_home else 0.0)
+    best = np.where(beside, np.abs(np.nan_to_num(above_m, nan=0.0)), np.inf).argmin(axis=0)
+    return np.asarray(np.take_along_axis(above_m, best[None], axis=0)[0], dtype=np.float64)
 
 
 def heights_on(
@@ -159,9 +175,16 @@ def heights_on(
     >>> heights_on(way, np.array([51.49, 51.505]), np.array([25.3, 25.301])).round(6).tolist()
     [40.0, 50.0]
     """
+    return _nearest_on(way, lon_deg, lat_deg)[0]
+
+
+def _nearest_on(
+    way: NDArray[np.float64], lon_deg: NDArray[np.float64], lat_deg: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the height of the nearest place on a way, and how far away it is, metres."""
     plane = LocalPlane(float(way[0, 0]), float(way[0, 1]))
     turns, at = plane.metres(way[:, 0], way[:, 1]), plane.metres(lon_deg, lat_deg)
-    nearest = np.full(at.shape[0], np.inf)
+    nearest = np.hypot(*(at - turns[0]).T)
     height = np.full(at.shape[0], way[0, 2])
     pairs = zip(turns[:-1], turns[1:], way[:-1, 2], way[1:, 2], strict=True) if len(way) > 1 else ()
     for start, end, from_m, to_m in pairs:
@@ -172,7 +195,7 @@ def heights_on(
         nearer = away < nearest
         nearest[nearer] = away[nearer]
         height[nearer] = (from_m + share * (to_m - from_m))[nearer]
-    return height
+    return height, nearest
 
 
 def missed_stops(stops: NDArray[np.int64], visited: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -85,6 +85,11 @@ class Zones(Barred):
                 best[seen] = length + away[seen]
         return best
 
+    def turns_near(self, place: tuple[float, float], within_m: float) -> Points:
+        """Return where ways past may turn, as far as that is from a place."""
+        away_m = np.hypot(*(self._corners - self.plane.metres(*place)).T)
+        return [(float(lon), float(lat)) for lon, lat in self.plane.degrees(self._corners[away_m <= within_m])]
+
     @cached_property
     def _corners(self) -> NDArray[np.float64]:
         """Corners that a shortest way may turn at, a little outside of the margins, (n, 2) metres."""

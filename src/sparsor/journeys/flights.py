@@ -9,6 +9,7 @@ import numpy as np
 
 from sparsor.geodesy.lengths import distance_m
 from sparsor.mission import Home, MissionPlan, build_mission, time_plan
+from sparsor.mission.triggers import CAMERA
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,6 +64,8 @@ class Flights:
         """
         flight, prepared = self.spec.flight, self.prepared
         lon, lat = prepared.place.grid.centres_deg(self.stops[order])
+        # One of several flights may dwell nowhere, which of the whole route is an error.
+        switches = bool(self.holds_s[order].any()) or not self.holds_s.any()
         return build_mission(
             lon,
             lat,
@@ -76,7 +79,7 @@ class Flights:
             wind=prepared.wind,
             zones=prepared.place.zones,
             ground=prepared.ground,
-            triggers=flight.triggers,
+            triggers=[one for one in flight.triggers if one.kind == CAMERA or switches],
         )
 
     def time(self, plan: MissionPlan) -> FlightTime:

@@ -67,6 +67,8 @@ class FlownMission:
         Longitude and latitude, degrees.
     heights_m : tuple of float
         Of vehicles at once, each its own.
+    kept_out : array of bool (N,) or None
+        Cells inside the area that are not flown to.
     """
 
     name: str
@@ -85,6 +87,12 @@ class FlownMission:
     earlier: int = 0
     home: tuple[float, float] | None = None
     heights_m: tuple[float, ...] = ()
+    kept_out: NDArray[np.bool_] | None = None
+
+    @property
+    def flown_to(self) -> NDArray[np.bool_]:
+        """Cells that may be flown to, (N,): full coverage, which a budget in per cent is of, is over these."""
+        return self.allowed if self.kept_out is None else self.allowed & ~self.kept_out
 
     @property
     def route(self) -> NDArray[np.int64]:
@@ -121,6 +129,7 @@ def mission_of_folder(folder: Path) -> FlownMission:
         earlier=sidecar.flown.size,
         home=sidecar.home[:2],
         heights_m=sidecar.heights_m,
+        kept_out=sidecar.kept_out,
     )
 
 
@@ -177,7 +186,8 @@ def _stops_now(plans: Mapping[str, Path], sidecar: Sidecar) -> tuple[NDArray[np.
     if not edited:
         return sidecar.stops, ()
     try:
-        flown = [stops_in_order(with_passing(read_plan(path), sidecar), sidecar.grid) for path in plans.values()]
+        in_order = sorted(plans.values(), key=lambda path: (len(path.name), path.name))  # the tenth after the ninth
+        flown = [stops_in_order(with_passing(read_plan(path), sidecar), sidecar.grid) for path in in_order]
     except MissionError as error:
         return sidecar.stops, (f"{edited} was changed and cannot be read: the stops are as planned ({error}).",)
     return np.concatenate(flown), (

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from sparsor.journeys.planning import PlannedMission
     from sparsor.mission.specification import MissionSpecification
 
@@ -42,7 +44,8 @@ def check_folder(spec: MissionSpecification, folder: Path, *, force: bool) -> No
             raise MissionError(f"'{path}' is a file; give a folder with -o")
     written = {(folder / file).resolve() for file in _files(spec)}
     for path in spec.inputs:
-        if path.resolve() in written:
+        sortie = path.resolve().parent == folder.resolve() and _of_sorties(spec).fullmatch(path.name)
+        if sortie or path.resolve() in written:
             raise MissionError(
                 f"'{path}' is read for this mission and would be written over: choose another --name or -o"
             )
@@ -125,9 +128,13 @@ def _files_before(folder: Path) -> set[str]:
     """Return the names of the files of the mission that is in a folder now, by its own specification."""
     with suppress(MissionError):
         spec = read_specification(folder / SPECIFICATION_FILE)
-        sortie = re.compile(rf"{re.escape(spec.name)}-\d+\.({'|'.join(('plan', *spec.output.export))})")
-        return _files(spec) | {path.name for path in folder.iterdir() if sortie.fullmatch(path.name)}
+        return _files(spec) | {path.name for path in folder.iterdir() if _of_sorties(spec).fullmatch(path.name)}
     return set()
+
+
+def _of_sorties(spec: MissionSpecification) -> re.Pattern[str]:
+    """Return what the files of a mission's sorties are called."""
+    return re.compile(rf"{re.escape(spec.name)}-\d+\.({'|'.join(('plan', *spec.output.export))})")
 
 
 def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
@@ -138,7 +145,6 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         cells = np.zeros(phi.shape[1], dtype=np.bool_)
         cells[before.cells] = True
         phi = np.eye(phi.shape[1], dtype=np.bool_)[cells | phi.any(axis=0)]
-    way = [place for one in mission.plans for place in flown_way(one)]
     return Sidecar(
         name=mission.specification.name,
         grid=mission.place.grid,
@@ -164,7 +170,29 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         sensor=mission.sensor,
         passing=tuple(passed),
         flown=np.zeros(0, dtype=np.int64) if before is None else before.stops,
-        heights_m=() if mission.sorties is None else mission.sorties.heights_m,
+        heights_m=_heights_m(mission),
         above_ground=mission.ground is not None,
-        way=np.array([] if mission.ground is None else way, dtype=np.float64).reshape(-1, 3),
+        way=_way(mission),
     )
+
+
+def _heights_m(mission: PlannedMission) -> tuple[float, ...]:
+    """Return the heights of vehicles at once, those of the mission that is resumed among them."""
+    new = () if mission.sorties is None else mission.sorties.heights_m
+    old = () if mission.before is None else mission.before.mission.heights_m
+    if mission.before is None or not (new or old):
+        return new
+    one = (mission.specification.flight.altitude_m,)
+    return tuple(sorted({*(new or one), *(old or one)}))
+
+
+def _way(mission: PlannedMission) -> NDArray[np.float64]:
+    """Return what is flown at heights over terrain; parts that begin at another home, and earlier flights, apart."""
+    apart = (np.nan, np.nan, np.nan)
+    way: list[tuple[float, ...]] = []
+    if mission.ground is not None:
+        for plan, before in zip(mission.plans, (mission.plans[0], *mission.plans), strict=False):
+            way += [*([apart] if plan.home != before.home else []), *flown_way(plan)]
+    found = np.array(way, dtype=np.float64).reshape(-1, 3)
+    earlier = None if mission.before is None else mission.before.mission.way
+    return found if earlier is None or not way else np.concatenate((found, [apart], earlier))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from sparsor.geodesy import BoundingBox
+    from sparsor.geodesy.zones import Zones
     from sparsor.mission import Fault, MissionPlan
     from sparsor.mission.clearance import Leg
     from sparsor.mission.specification import MissionSpecification
@@ -44,30 +46,35 @@ class GroundFacts:
         Of the elevation model.
     pixel_m : tuple of float
         Width and height.
-    home_m : float
-        Height of the ground at home.
+    homes_m : tuple of float
+        Height of the ground at each home that is flown from.
     lowest_m, highest_m : float
-        Of what is flown along legs, above home.
+        Of what is flown along legs, above the home of each flight.
     least_m, most_m : float
         Least height above the highest ground near, greatest above the ground below.
     way_home_m : float
-        How far above home the ground rises at most on the straight ways home.
+        How far above a flight's home the ground rises at most on the straight ways there.
+    return_m : float
+        Above home, at which the straight way home of every flight is free.
     passed : int
         Waypoints that are there for the heights only.
     """
 
     file: str
     pixel_m: tuple[float, float]
-    home_m: float
+    homes_m: tuple[float, ...]
     lowest_m: float
     highest_m: float
     least_m: float
     most_m: float
     way_home_m: float
+    return_m: float
     passed: int
 
 
-def mission_ground(spec: MissionSpecification, box: BoundingBox, vehicle: Vehicle) -> Ground | None:
+def mission_ground(
+    spec: MissionSpecification, box: BoundingBox, vehicle: Vehicle, zones: Zones | None = None
+) -> Ground | None:
     """Return the ground that a mission follows, None where none was asked for.
 
     Raises
@@ -83,8 +90,9 @@ def mission_ground(spec: MissionSpecification, box: BoundingBox, vehicle: Vehicl
     if not vehicle.flies:
         raise MissionError(f"a {vehicle.kind} stays on the ground: leave --terrain out")
     lon, lat = [box.west_deg, box.east_deg], [box.south_deg, box.north_deg]
-    if flight.home is not None:
-        lon, lat = [*lon, flight.home[0]], [*lat, flight.home[1]]
+    passed = () if zones is None else _turns(zones, box, flight.given_homes)
+    for place in (*flight.given_homes, *passed):
+        lon, lat = [*lon, place[0]], [*lat, place[1]]
     margin_m = MARGIN_M
     if vehicle.circles:
         margin_m += 2 * REACH_TURNS * vehicle.turn_radius_m + approach_m(vehicle, flight.altitude_m)
@@ -95,6 +103,16 @@ def mission_ground(spec: MissionSpecification, box: BoundingBox, vehicle: Vehicl
         flight.altitude_m,
         usual_tolerance_m(flight.altitude_m) if tolerance_m is None else tolerance_m,
     )
+
+
+def _turns(zones: Zones, box: BoundingBox, homes: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float]]:
+    """Yield the places at which the ways from and to home may turn past keep-outs, some of them outside of the box."""
+    lon, lat = [box.west_deg, box.west_deg, box.east_deg, box.east_deg], [box.south_deg, box.north_deg] * 2
+    across_m = math.hypot(box.east_m, box.north_m)
+    for home in homes or ((box.centre_lon_deg, box.centre_lat_deg),):
+        ways_m = zones.lengths_m(home, lon, lat)
+        longest_m = float(ways_m[np.isfinite(ways_m)].max(initial=0.0))
+        yield from zones.turns_near(home, longest_m + across_m)
 
 
 def terrain_under(path: Path, plan: MissionPlan, vehicle: Vehicle | None) -> Terrain:
@@ -151,47 +169,72 @@ def check_over(plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle)
 
 def ground_facts(plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle) -> GroundFacts:
     """Return what plans fly over."""
-    plan, terrain = plans[0], ground.terrain
-    home = (plan.home.lon_deg, plan.home.lat_deg)
-    home_m = ground.home_m(home)
-    legs = [leg for one in plans for leg in legs_of(one, ground, vehicle) if leg.kind == "level"]
-    flown = np.concatenate([leg.flown_m for leg in legs])
-    over = np.concatenate([leg.flown_m - leg.ground_m for leg in legs])
+    terrain = ground.terrain
+    homes = [(plan.home.lon_deg, plan.home.lat_deg) for plan in plans]
+    homes_m = [ground.home_m(home) for home in homes]
+    legs = [
+        (leg, home_m)
+        for plan, home_m in zip(plans, homes_m, strict=True)
+        for leg in legs_of(plan, ground, vehicle)
+        if leg.kind == "level"
+    ]
+    flown = np.concatenate([leg.flown_m - home_m for leg, home_m in legs])
+    over = np.concatenate([leg.flown_m - leg.ground_m for leg, _ in legs])
     return GroundFacts(
         file=terrain.path.name,
         pixel_m=terrain.pixel_m,
-        home_m=home_m,
-        lowest_m=float(flown.min()) - home_m,
-        highest_m=float(flown.max()) - home_m,
-        least_m=min(leg.least_m for leg in legs),
+        homes_m=tuple(dict(zip(homes, homes_m, strict=True)).values()),
+        lowest_m=float(flown.min()),
+        highest_m=float(flown.max()),
+        least_m=min(leg.least_m for leg, _ in legs),
         most_m=float(over.max()),
-        way_home_m=max(highest_way_home_m(one.items, home, terrain, home_m) for one in plans),
-        passed=sum(len(one.passing) for one in plans),
+        way_home_m=max(
+            highest_way_home_m(plan.items, home, terrain, home_m)
+            for plan, home, home_m in zip(plans, homes, homes_m, strict=True)
+        ),
+        return_m=max(plan.rally_points[0].altitude_m for plan in plans),
+        passed=sum(len(plan.passing) for plan in plans),
+    )
+
+
+def _hang_on_home(facts: GroundFacts) -> str:
+    if len(facts.homes_m) == 1:
+        return (
+            f"All heights hang on the ground at home, {facts.homes_m[0]:.1f} m in the model: take off there, from the "
+            "ground."
+        )
+    heights = ", ".join(f"{height_m:.1f}" for height_m in facts.homes_m)
+    return (
+        f"The heights of each flight hang on the ground at its own home, {heights} m in the model: take off from the "
+        "home of the plan that is flown, from the ground, and from no other."
     )
 
 
 def said_of_ground(
-    facts: GroundFacts, plan: MissionPlan, ground: Ground, vehicle: Vehicle, home_altitude_m: float | None
+    facts: GroundFacts, plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle, home_altitude_m: float | None
 ) -> tuple[str, ...]:
     """Return what has to be known of a flight over terrain, in sentences."""
     terrain = ground.terrain
     width, height = facts.pixel_m
     above = f"Its heights: {terrain.vertical}." if terrain.vertical else "What its heights are above it does not say."
     unit = "" if terrain.unit_said else " Nor does it say their unit: metres were taken."
-    name = "px4" if plan.autopilot is not None and plan.autopilot.name == "px4" else "ardupilot"
+    autopilot = plans[0].autopilot
+    name = "px4" if autopilot is not None and autopilot.name == "px4" else "ardupilot"
     found = [
         f"The heights are kept above the ground of '{facts.file}', pixels of {width:.3g} x {height:.3g} m: "
         f"{facts.lowest_m:.0f} to {facts.highest_m:.0f} m above home, nowhere less than {facts.least_m:.1f} m above "
         f"that ground. Trees, buildings and wires are not in such a model, or may not be. {above}{unit}",
-        f"All heights hang on the ground at home, {facts.home_m:.1f} m in the model: take off there, from the ground.",
+        _hang_on_home(facts),
         f"A failsafe return flies straight home at an altitude of the vehicle's own "
         f"({RETURN_ALTITUDES[name, vehicle.circles]}), whatever the ground: on the way home it rises to "
-        f"{max(facts.way_home_m, 0):.0f} m above home. Set that altitude to "
-        f"{plan.rally_points[0].altitude_m:g} m or more, as the rally point has it.",
+        f"{max(facts.way_home_m, 0):.0f} m above home. Set that altitude to {facts.return_m:g} m or more, as the "
+        f"{'highest ' if len(plans) > 1 else ''}rally point has it.",
     ]
-    if home_altitude_m is not None and abs(home_altitude_m - facts.home_m) > HOME_DIFFERS_M:
+    given_m = home_altitude_m
+    wrong = [one for one in facts.homes_m if given_m is not None and abs(given_m - one) > HOME_DIFFERS_M]
+    if wrong:
         found.append(
-            f"The ground at home is {facts.home_m:.0f} m high in the model, --home-altitude is {home_altitude_m:g} m. "
+            f"The ground at home is {wrong[0]:.0f} m high in the model, --home-altitude is {given_m:g} m. "
             "Is home where it should be, and are both above the same (sea level, ellipsoid)?"
         )
     if facts.most_m > vehicle.ceiling_m:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from sparsor.errors import MissionError
@@ -133,7 +134,8 @@ def _kept_out(sidecar: Sidecar) -> str:
 def _above(sidecar: Sidecar) -> str:
     if not sidecar.above_ground:
         return "home"
-    return f"the ground, {sidecar.way[:, 2].min():g} to {sidecar.way[:, 2].max():g} m above home"
+    heights_m = sidecar.way[sidecar.way[:, 2] > -inf, 2]  # without what parts the way
+    return f"the ground, {heights_m.min():g} to {heights_m.max():g} m above home"
 
 
 def _sidecar(sidecar: Sidecar, path: Path) -> Inspection:

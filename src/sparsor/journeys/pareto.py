@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sparsor.core.progress import Progress, silent
 from sparsor.core.workers import Workers, workers_of
 from sparsor.design import parse_budget
-from sparsor.errors import BudgetError, MissionError
+from sparsor.errors import InputError, MissionError
 from sparsor.journeys.folder import CURVE_FILES
 from sparsor.journeys.planning import PlannedMission, plan_prepared
 from sparsor.journeys.preparing import prepare
@@ -42,7 +42,7 @@ def plan_with_curve(
     mission : PlannedMission
         The same as without the others.
     curve : tuple of PlannedMission
-        It and the others, the smallest budget first; budgets that no route meets are left out.
+        It and the others, the smallest budget first; budgets that no mission can be made for are left out.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def plan_with_curve(
         begin = [before.candidate.stops] if share > 1 else []
         try:
             planned[share] = before = plan_prepared(asked, prepared, begin=begin, workers=hands)
-        except BudgetError:
+        except InputError:  # no route, too many items, a trigger with no dwell, vehicles too near to each other ...
             continue
         finally:
             progress("other budgets", done, len(shares))

@@ -291,7 +291,7 @@ def _assemble(
         check_over(mission.plans, prepared.ground, vehicle)
         facts = ground_facts(mission.plans, prepared.ground, vehicle)
         mission = replace(mission, ground=prepared.ground, ground_facts=facts)
-        over = said_of_ground(facts, plan, prepared.ground, vehicle, spec.flight.home_altitude_m)
+        over = said_of_ground(facts, mission.plans, prepared.ground, vehicle, spec.flight.home_altitude_m)
         warnings = (*warnings, *over, *_beyond_budget(mission))
     said = (*warnings, *advice(mission), *beyond, *said_of_shore(mission), *_of_the_plans(mission), *prior.warnings)
     return replace(mission, warnings=said if place.zones is None else (*said, _STRAIGHT))

@@ -176,13 +176,14 @@ def prepare(spec: MissionSpecification, *, workers: Workers | int = 1, progress:
     autopilot, sensor = autopilot_named(spec.flight.autopilot), sensor_of(spec)
     check_triggers(spec.flight.triggers, autopilot)
     box, area = _where(spec)
-    ground = mission_ground(spec, box, vehicle)
     if spec.resume is None:
         prior = choose_prior(spec.prior, box, paper=spec.search.paper, workers=workers, progress=progress)
     else:
         prior = _prior_flown(spec, box, spec.resume.mission)
     grid = Grid(box, prior.model.shape)
-    place = _place(grid, area, mission_zones(spec, grid, vehicle, autopilot), mission_shore(spec, grid))
+    zones = mission_zones(spec, grid, vehicle, autopilot)
+    ground = mission_ground(spec, box, vehicle, zones)
+    place = _place(grid, area, zones, mission_shore(spec, grid))
     speed = vehicle.cruise_m_s if spec.flight.speed_m_s is None else spec.flight.speed_m_s
     wind = spec.flight.steady_wind
     check_wind(vehicle, wind, speed)

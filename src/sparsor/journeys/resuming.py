@@ -137,7 +137,7 @@ def resumed_specification(
         **given,
         "name": given.get("name") or following(old.name),
         "search": {"planner": "refined", **_given(given.get("search"))},
-        "flight": {**_home(mission, old), **_given(given.get("flight"))},
+        "flight": _flight(mission, old, _given(given.get("flight"))),
         "resume": {"mission": folder, "logs": (*earlier, *new), "sensor": sensor, "calibration": calibration},
     }
     spec = changed(old, asked, base=base)
@@ -245,7 +245,7 @@ def budget_left(spec: MissionSpecification, before: Before) -> str:
     BudgetError
         When nothing is.
     """
-    grid, allowed = before.mission.grid, before.mission.allowed
+    grid, flown_to = before.mission.grid, before.mission.flown_to
     total_m, flown_m = before.covered.total_m, before.covered.length_m
     if spec.search.budget is not None:
         asked = parse_budget(spec.search.budget)
@@ -253,7 +253,7 @@ def budget_left(spec: MissionSpecification, before: Before) -> str:
             if before.air_s >= asked.value:
                 raise BudgetError(_spent(spec, f"{before.air_s / 60:.1f} of {asked.value / 60:.1f} min were flown"))
             return f"{asked.value - before.air_s:.1f}s"
-        total_m = asked.value * grid.full_coverage_m(allowed) if asked.measure == "fraction" else asked.value
+        total_m = asked.value * grid.full_coverage_m(flown_to) if asked.measure == "fraction" else asked.value
     if round(total_m - flown_m, 1) <= 0:
         raise BudgetError(_spent(spec, f"{flown_m / 1000:.2f} of {total_m / 1000:.2f} km over the stops were flown"))
     return f"{total_m - flown_m:.1f}m"
@@ -281,9 +281,10 @@ def _own_logs(resume: ResumeSection) -> tuple[Path, ...]:
     return tuple(log for log in resume.logs if log.resolve() not in known)
 
 
-def _home(mission: FlownMission, spec: MissionSpecification) -> dict[str, Any]:
-    """Return home as it was: where none was given it was the first stop, and the people stand there."""
-    return {} if spec.flight.given_homes else {"home": mission.home}
+def _flight(mission: FlownMission, spec: MissionSpecification, given: dict[str, Any]) -> dict[str, Any]:
+    """Return what is asked of the flight, home as it was: where none was given it was the first stop."""
+    known = bool(spec.flight.given_homes) or not given.keys().isdisjoint(("home", "homes"))
+    return given if known else {"home": mission.home, **given}
 
 
 def _given(section: dict[str, Any] | None) -> dict[str, Any]:

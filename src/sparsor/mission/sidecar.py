@@ -67,7 +67,8 @@ class Sidecar:
         Whether `altitude_m` is above the ground, which `way` then follows.
     way : array of float64 (n, 3)
         Longitude, latitude (degrees) and height above home (m) of what is flown, where the height is not the same
-        everywhere; else empty.
+        everywhere; else empty. A row of NaN stands between parts whose heights are above different homes, and before
+        those of earlier flights of a resumed mission.
     """
 
     name: str
@@ -113,7 +114,7 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
         about["heights_m"] = list(sidecar.heights_m)
     if sidecar.above_ground:
         about["above_ground"] = True
-        about["way"] = sidecar.way.tolist()
+        about["way"] = [[None if value != value else value for value in row] for row in sidecar.way.tolist()]
     if sidecar.sensor is not None:
         about["sensor"] = sidecar.sensor.model_dump(mode="json")
     return arrays_to_npz(

@@ -426,7 +426,7 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
             if flight[name] in usual:  # it suited the vehicle of then
                 del flight[name]
     for section, values in _without_none(data).items():
-        if section == "area" and values:
+        if section in ("area", "sensor") and values:  # of two that exclude each other
             merged[section] = values
         elif isinstance(values, dict):
             merged[section] = {**merged.get(section, {}), **values}
