@@ -58,6 +58,13 @@ def test_it_says_how_far_how_long_and_how_full(briefed):
     assert 0.6 * known_s < briefing.seconds < 1.1 * known_s
 
 
+@pytest.mark.parametrize(("north_deg", "said"), [(0.0005, False), (0.002, True)])
+def test_who_stands_beside_home_is_told_that_heights_count_from_there(briefed, north_deg, said):
+    with practice(ready_s=0.0) as server:
+        briefing = briefed(server, away_plan(north_deg), profile=QUAD)
+    assert any("heights will count from the ground where it takes off" in one for one in briefing.warnings) is said
+
+
 @pytest.mark.parametrize("north_deg", [0.07, 5.0])
 def test_a_plan_for_another_place_is_not_started_and_not_even_sent(tmp_path, north_deg):
     path = tmp_path / "far.plan"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sparsor.vehicle import Vehicle
 
 TOO_FAR_M: Final = 5000.0  # from the vehicle to the plan's home or first waypoint: another place is meant
+BESIDE_HOME_M: Final = 100.0
 TOO_EMPTY: Final = 30  # percent
 REQUEST_MESSAGE: Final = 512  # MAV_CMD
 BATTERY_MESSAGES: Final = ("SYS_STATUS", "BATTERY_STATUS")
@@ -86,9 +87,8 @@ def brief(
     if refusals and not force:
         raise LinkError(f"not started, nothing was sent. {' '.join(refusals)} --force starts all the same.")
     length_m, seconds, height_m = _flight(plan, profile or load_vehicle("quad"))
-    return Briefing(
-        home_m, first_m, length_m, seconds, height_m, battery, (*refusals, *_doubts(battery, seconds, profile))
-    )
+    warnings = (*refusals, *_beside_home(home_m), *_doubts(battery, seconds, profile))
+    return Briefing(home_m, first_m, length_m, seconds, height_m, battery, warnings)
 
 
 def _distances(plan: MissionPlan, place: tuple[float, float] | None) -> tuple[float | None, float | None]:
@@ -108,6 +108,16 @@ def _too_far(home_m: float | None, first_m: float | None) -> tuple[str, ...]:
         "plan for this place?"
         for what, away_m in places
         if away_m is not None and away_m > TOO_FAR_M
+    )
+
+
+def _beside_home(home_m: float | None) -> tuple[str, ...]:
+    """Say that heights above home are above another place: where a vehicle arms is its home."""
+    if home_m is None or not BESIDE_HOME_M < home_m <= TOO_FAR_M:
+        return ()
+    return (
+        f"The vehicle stands {home_m:.0f} m from the plan's home: the plan's heights will count from the ground where "
+        "it takes off. Is it the plan for this place, of several homes or sorties the right one?",
     )
 
 
