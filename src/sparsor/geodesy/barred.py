@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from sparsor.geodesy.plane import LocalPlane
+
+QUARTER = 4  # sides of a quarter of a rounded margin
 
 
 @dataclass(frozen=True)
@@ -45,3 +48,12 @@ class Barred:
     def _prepared(self) -> BaseGeometry:
         shapely.prepare(self.area)
         return self.area
+
+
+def widened(shape: BaseGeometry, margin_m: float) -> BaseGeometry:
+    """Return a shape, in metres, grown by a margin at least; its corners are rounded by sides that lie outside of it.
+
+    GEOS rounds the number of sides of a corner, so that a side may take one and a half times the angle asked for: the
+    middle of a side is then nearer to the corner than its ends by the cosine of half of that.
+    """
+    return shape.buffer(margin_m / math.cos(1.5 * math.pi / (4 * QUARTER)), quad_segs=QUARTER)

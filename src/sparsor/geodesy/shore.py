@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import shapely
 
-from sparsor.geodesy.barred import Barred
-from sparsor.geodesy.zones import bulge_m, inner
+from sparsor.geodesy.barred import Barred, widened
+from sparsor.geodesy.zones import bulge_m
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Side = Literal["land", "sea"]
 OTHER: Final[dict[Side, Side]] = {"land": "sea", "sea": "land"}
-QUARTER = 4  # sides of a quarter of a rounded margin
 SMOOTHED = 0.05  # of the margin: by so much it is larger than asked for, so that it has fewer corners
 SMOOTHED_OF_BOX = 1e-4  # of the box's diagonal: the same, where cells are of kilometres
 RADII = 1.005  # the ellipsoid's radii of curvature over the latitudes of any box, from those at its middle
@@ -102,5 +101,5 @@ def shore_of(land: Land, side: Side, *, box: BoundingBox, plane: LocalPlane, mar
     step_m = max(SMOOTHED * grown_m, SMOOTHED_OF_BOX * float(np.hypot(box.east_m, box.north_m))) / 2
     # Each of the two simplifications moves an edge by a step at most: the two that are added hold what was there.
     coarse = shapely.make_valid(other.simplify(step_m))
-    margin = coarse.buffer((grown_m + 2 * step_m) / inner(), quad_segs=QUARTER).simplify(step_m)
+    margin = widened(coarse, grown_m + 2 * step_m).simplify(step_m)
     return Shore(plane, margin.intersection(frame), side, ground, margin_m, land.source)

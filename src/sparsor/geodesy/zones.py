@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from sparsor.errors import AreaError
-from sparsor.geodesy.barred import Barred
+from sparsor.geodesy.barred import Barred, widened
 from sparsor.geodesy.outward import MITRE, corners, simplified_outward
 from sparsor.geodesy.plane import LocalPlane
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
     from shapely import Polygon
+    from shapely.geometry.base import BaseGeometry
 
     from sparsor.geodesy.keepouts import KeepOut
 
@@ -28,7 +29,6 @@ Points = list[tuple[float, float]]
 ROUNDING_M = 0.05  # corners are written to 1e-7 degrees, about a centimetre
 ASIDE_M = 0.3  # of a way's corners from the margin that they pass
 LEAST_CORNERS = 4
-QUARTER = 4  # sides of a quarter of a rounded margin
 EARTH_M = 6_371_000.0
 MOST_BULGE_M = 25.0
 
@@ -175,7 +175,7 @@ def zones_of(
         (round(one.lon_deg[0], 7), round(one.lat_deg[0], 7), round(one.radius_m + ROUNDING_M, 2)) for one in round_ones
     )
     for lon, lat, radius_m in circles:
-        middle = shapely.Point(0.0, 0.0).buffer((radius_m + whole_m) / inner(), quad_segs=QUARTER)
+        middle = widened(shapely.Point(0.0, 0.0), radius_m + whole_m)
         areas.append(_moved(middle, LocalPlane(lon, lat), plane))
     names = tuple(one.name for one in keep_outs)
     return Zones(plane, shapely.union_all(areas), tuple(written), circles, names)
@@ -199,30 +199,21 @@ def _within(shapes: list[Polygon], room: int) -> list[Polygon]:
     return fenced
 
 
-def _with_margin(polygon: Polygon, margin_m: float, plane: LocalPlane) -> Polygon:
+def _with_margin(polygon: Polygon, margin_m: float, plane: LocalPlane) -> BaseGeometry:
     """Return a polygon grown by a margin that is measured where the polygon lies."""
     lon, lat = plane.degrees(shapely.get_coordinates(polygon.centroid)[0])
     own = LocalPlane(float(lon), float(lat))
-    grown = _moved(polygon, plane, own).buffer(margin_m * 1.002 / inner(), quad_segs=QUARTER)
-    return _moved(grown, own, plane)
+    return _moved(widened(_moved(polygon, plane, own), margin_m * 1.002), own, plane)
 
 
-def _moved(polygon: Polygon, start: LocalPlane, end: LocalPlane) -> Polygon:
-    """Return a polygon in another plane's metres."""
-    return shapely.transform(polygon, lambda points: end.metres(*start.degrees(points).T))
+def _moved(shape: BaseGeometry, start: LocalPlane, end: LocalPlane) -> BaseGeometry:
+    """Return a shape in another plane's metres."""
+    return shapely.transform(shape, lambda points: end.metres(*start.degrees(points).T))
 
 
 def bulge_m(leg_m: float, lat_deg: float) -> float:
     """Return how far a leg of some length may bulge out of the straight line on the map, metres; 25 at most."""
     return min(leg_m**2 * math.tan(math.radians(abs(lat_deg))) / (8.0 * EARTH_M), MOST_BULGE_M)
-
-
-def inner() -> float:
-    """Return how much nearer the middle the sides of a rounded corner are than its points.
-
-    GEOS rounds the number of sides of a corner, so that a side may take one and a half times the angle asked for.
-    """
-    return math.cos(1.5 * math.pi / (4 * QUARTER))
 
 
 def _rounded(points: NDArray[np.float64]) -> Points:
