@@ -131,8 +131,7 @@ def resumed_specification(
     mission = mission_of_folder(folder)
     old = read_specification(folder / SPECIFICATION_FILE)
     earlier = () if old.resume is None else old.resume.logs
-    known = {path.resolve() for path in earlier}
-    new = tuple(base / path for path in logs if (base / path).resolve() not in known)
+    new = _others(tuple(base / path for path in logs), earlier)
     asked = {
         **given,
         "name": given.get("name") or following(old.name),
@@ -277,8 +276,13 @@ def _own_logs(resume: ResumeSection) -> tuple[Path, ...]:
     """Return the logs that are not of the flights before the mission that is resumed."""
     path = resume.mission / SPECIFICATION_FILE
     before = read_specification(path).resume if path.is_file() else None
-    known = set() if before is None else {log.resolve() for log in before.logs}
-    return tuple(log for log in resume.logs if log.resolve() not in known)
+    return resume.logs if before is None else _others(resume.logs, before.logs)
+
+
+def _others(logs: tuple[Path, ...], known: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Return the logs that are none of those known, by whatever path they were given."""
+    places = {log.resolve() for log in known}
+    return tuple(log for log in logs if log.resolve() not in places)
 
 
 def _flight(mission: FlownMission, spec: MissionSpecification, given: dict[str, Any]) -> dict[str, Any]:
