@@ -1,15 +1,19 @@
-"""What a run leaves out because this machine lacks it, and that it says so."""
+"""What a run leaves out because this machine lacks it, and that it says so; which examples property tests draw."""
 
 from __future__ import annotations
 
 import os
 from typing import TYPE_CHECKING
 
+from hypothesis import settings
+
 from browser import BROWSER, NAMES
 
 if TYPE_CHECKING:
     import pytest
 
+# Who runs the tests learns whether this code works here, not what luck finds: the same examples each time.
+settings.register_profile("same", derandomize=True, database=None)
 SITL = "SPARSOR_SITL_URL"
 NOTICES = {
     "sitl": f"{SITL} names no autopilot: the tests marked 'sitl' are left out (docs/sitl.md says how to run them)",
@@ -23,7 +27,14 @@ def missing() -> list[str]:
     return [mark for mark, found in there.items() if not found]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--examples", type=int, metavar="K", help="let property tests draw new examples, K times as many as usual"
+    )
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("default" if config.getoption("examples") else "same")
     config.addinivalue_line("markers", f"sitl: flies the autopilot that {SITL} names; left out when it names none")
     config.addinivalue_line("markers", f"browser: opens a page in {', '.join(NAMES)}; left out where there is none")
 
@@ -33,6 +44,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
+    for test in {getattr(item, "function", None) for item in items if config.getoption("examples")}:
+        if hasattr(test, "hypothesis"):
+            used = test._hypothesis_internal_use_settings
+            more = used.max_examples * config.getoption("examples")
+            test._hypothesis_internal_use_settings = settings(used, max_examples=more)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

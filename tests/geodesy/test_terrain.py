@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +42,7 @@ def test_nothing_between_points_along_a_line_is_missed(
     terrain = terrain_of(write_dem(tmp_path_factory.mktemp("dem") / "dem.tif", rough))
     start, end = ((51.5 + 0.03 * ends[k], 25.27 + 0.03 * ends[k + 1]) for k in (0, 2))
     along, lon, lat = line_deg(start, end, terrain.step_m)
-    near = terrain.highest_m(lon, lat, beside_m)
+    near = terrain.highest_m(lon, lat, beside_m + terrain.step_m / 2)
     fine = np.linspace(0, 1, 40 * along.size)
     exact = np.interp(fine * along[-1], along, lon), np.interp(fine * along[-1], along, lat)
     parts = np.clip(np.searchsorted(along, fine * along[-1]), 1, along.size - 1)
@@ -49,6 +50,28 @@ def test_nothing_between_points_along_a_line_is_missed(
     assert (rough.at(*exact) <= allowed + 1e-3).all()
     assert (rough.at(lon + beside_m / 101_000, lat) <= near + 1e-3).all()
     assert (rough.at(lon, lat - beside_m / 111_000) <= near + 1e-3).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0, 1), st.floats(0, 1), st.floats(0, 150))
+def test_the_highest_ground_is_that_within_the_distance(
+    tmp_path_factory: pytest.TempPathFactory, across: float, down: float, reach_m: float
+) -> None:
+    rough = Hills(np.random.default_rng(8).uniform(0, 100, (330, 330)))
+    terrain = terrain_of(write_dem(tmp_path_factory.mktemp("dem") / "dem.tif", rough))
+    lon, lat = 51.5 + 0.03 * across, 25.27 + 0.03 * down
+    column, row = (lon - 51.47) * 3600 - 0.5, (25.33 - lat) * 3600 - 0.5
+    reach = [reach_m / side for side in terrain.pixel_m]
+
+    def peak(spare: float) -> float:
+        """The highest of the pixels that the ground within a distance lies between, by their own rows and columns."""
+        rows = slice(math.floor(row - spare * reach[1]), math.ceil(row + spare * reach[1]) + 1)
+        columns = slice(math.floor(column - spare * reach[0]), math.ceil(column + spare * reach[0]) + 1)
+        return float(rough.heights_m[rows, columns].max())
+
+    found = float(terrain.highest_m(lon, lat, reach_m))
+    assert peak(1.0) - 1e-3 <= found <= peak(1.05) + 1e-3
+    assert found <= float(terrain.highest_m(lon + 1e-4, lat, reach_m + 10.2))
 
 
 def test_a_turned_raster_in_metres(tmp_path: Path) -> None:

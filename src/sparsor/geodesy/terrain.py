@@ -29,6 +29,7 @@ METRES_OF = {
 LOWEST_M, HIGHEST_M = -500.0, 9000.0  # the Dead Sea's shore, Mount Everest
 MOST_PIXELS = 60_000_000
 SPARE_PIXELS = 4
+UNEVEN = 1.02  # the sides of pixels are measured in one place; degrees are shorter farther from the equator
 SIDE_POINTS = 9  # along each side of what is read, when it is brought to the raster's own system
 
 
@@ -70,7 +71,7 @@ class Terrain:
 
     @property
     def step_m(self) -> float:
-        """The farthest apart that points along a leg may lie so that nothing between them is missed."""
+        """How far apart points along a leg lie: the shorter side of a pixel."""
         return min(self.pixel_m)
 
     def ground_m(self, lon_deg: ArrayLike, lat_deg: ArrayLike) -> NDArray[np.float64]:
@@ -87,28 +88,36 @@ class Terrain:
         return np.where(known, upper * (1 - down) + lower * down, np.nan)
 
     def highest_m(self, lon_deg: ArrayLike, lat_deg: ArrayLike, reach_m: float = 0.0) -> NDArray[np.float64]:
-        """Return the highest ground round points, metres; infinite where some of it is not known.
+        """Return the highest ground within a distance of points, metres; infinite where some of it is not known.
 
-        Round is everything within a pixel, and within `reach_m` metres: between points along a line that lie at most
-        `step_m` apart nothing is higher than the higher of the two.
+        What is within less of a point is within more of it, and of any other point by what lies between the two: so
+        what was planned with more to spare is never found wanting. Half the spacing of points along a line misses
+        nothing between them.
         """
-        width, height = (1 + math.ceil(reach_m / side) for side in self.pixel_m)
-        peaks = self._peaks(height, width)
         column, row = self._pixels(lon_deg, lat_deg)
-        # The window of a filter of even size is one longer before its pixel than after it.
-        j, i = np.floor(column) + 1, np.floor(row) + 1
-        rows, columns = peaks.shape
-        known = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-        at = np.where(known, i, 0).astype(np.int64), np.where(known, j, 0).astype(np.int64)
-        return np.where(known, peaks[at], np.inf).astype(np.float64)
+        half_width, half_height = (UNEVEN * reach_m / side for side in self.pixel_m)
+        # All pixel centres that the ground there lies between; two windows of one size, which overlap, have them all.
+        left, right = np.floor(column - half_width), np.ceil(column + half_width)
+        top, bottom = np.floor(row - half_height), np.ceil(row + half_height)
+        rows, columns = self.heights_m.shape
+        known = (left >= 0) & (top >= 0) & (right < columns) & (bottom < rows)
+        height, width = math.ceil(2 * half_height) + 1, math.ceil(2 * half_width) + 1
+        peaks = self._peaks(height, width)
+        found = np.full(known.shape, -np.inf)
+        for i in (top, bottom - height + 1):
+            for j in (left, right - width + 1):
+                at = np.where(known, i, 0).astype(np.int64), np.where(known, j, 0).astype(np.int64)
+                found = np.maximum(found, peaks[at])
+        return np.where(known, found, np.inf)
 
     def _peaks(self, height: int, width: int) -> NDArray[np.float32]:
+        """Return the highest pixels of the windows that begin at each pixel."""
         if (height, width) not in self.highest:
             from scipy.ndimage import maximum_filter1d
 
             peaks = np.where(np.isnan(self.heights_m), np.float32(np.inf), self.heights_m)
-            for axis, half in ((0, height), (1, width)):
-                peaks = maximum_filter1d(peaks, 2 * half + 2, axis=axis, mode="constant", cval=np.inf)
+            for axis, size in ((0, height), (1, width)):
+                peaks = maximum_filter1d(peaks, size, axis=axis, mode="constant", cval=np.inf, origin=-(size // 2))
             self.highest[height, width] = peaks
         return self.highest[height, width]
 

@@ -100,6 +100,11 @@ def legs_over(plan: MissionPlan, terrain: Terrain, home_m: float, reach_m: float
         Height of the ground at home.
     reach_m : float
         How far beside its legs the vehicle may come.
+
+    Notes
+    -----
+    The highest ground near is that within the reach and half a step, so that nothing between points is missed. Plans
+    are made with more (`following.heights_along`): wherever the points of a leg lie, they hold here.
     """
     at, up_m, name = (plan.home.lon_deg, plan.home.lat_deg), home_m, "home"
     kind: Kind = "level"
@@ -213,7 +218,7 @@ def highest_way_home_m(items: Sequence[MissionItem], home: Point, terrain: Terra
     highest_m = home_m
     for place in sorted(places):
         _, lon, lat = line_deg(place, home, terrain.step_m)
-        peaks = terrain.highest_m(lon, lat)
+        peaks = terrain.highest_m(lon, lat, terrain.step_m / 2)
         highest_m = max(highest_m, float(peaks[np.isfinite(peaks)].max(initial=-math.inf)))
     return highest_m - home_m
 
@@ -254,7 +259,7 @@ def _leg(
         base_m,
         flown,
         terrain.ground_m(lon, lat),
-        terrain.highest_m(lon, lat, reach_m),
+        terrain.highest_m(lon, lat, reach_m + terrain.step_m / 2),
     )
 
 

@@ -29,6 +29,7 @@ REACH_TURNS = 2.0
 TOLERANCE_SHARE, LEAST_TOLERANCE_M = 0.1, 2.0
 FLAT = 1e-9
 DECIMALS = 7  # as autopilots store positions
+PLACE_M = 0.02  # and what is lost in that
 
 
 def usual_tolerance_m(height_m: float) -> float:
@@ -162,14 +163,17 @@ def heights_along(
         When the ground under a leg is not known, or the vehicle cannot climb over it below the ceiling.
     """
     terrain = ground.terrain
-    legs = [line_deg(start, end, terrain.step_m) for start, end in pairwise(way)]
+    legs = [line_deg(start, end, terrain.step_m / 2) for start, end in pairwise(way)]
     lon, lat = (np.concatenate([leg[part] for leg in legs]) for part in (1, 2))
     counts = np.array([leg[0].size for leg in legs])
     ends = np.cumsum(counts)
     leg_of = np.repeat(np.arange(counts.size), counts)
     before_m = np.concatenate([[0.0], np.cumsum([leg[0][-1] for leg in legs])[:-1]])
     along = np.concatenate([leg[0] for leg in legs]) + before_m[leg_of]
-    near, below = terrain.highest_m(lon, lat, steepness.reach_m), terrain.ground_m(lon, lat)
+    # Of two neighbours here each is within half a step of all between them, and has half a step more round it than
+    # `clearance` looks at there.
+    near = terrain.highest_m(lon, lat, steepness.reach_m + terrain.step_m + PLACE_M)
+    below = terrain.ground_m(lon, lat)
     unknown = np.flatnonzero(~np.isfinite(near) | np.isnan(below))
     if unknown.size:
         first = int(unknown[0])
