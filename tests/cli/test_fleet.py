@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from sparsor.journeys.flown import mission_of_folder
+from sparsor.journeys.practising import PracticeRequest, prepare_practice
 from sparsor.mission import read_plan, time_plan
+from sparsor.mission.sidecar import read_sidecar
 from sparsor.vehicle import load_vehicle
 
 pytestmark = pytest.mark.usefixtures("no_picture")
@@ -87,6 +89,41 @@ def test_vehicles_at_once_are_apart_and_check_says_so(console, tmp_path, homes):
     ran = console("sparsor", "check", folder)
     assert ran.code == 1
     assert "m-1.plan and m-2.plan may come as near as" in ran.out
+
+
+def test_vehicles_take_off_again_where_one_battery_each_is_not_enough(console, tmp_path):
+    words = ("--name", "m", "--vehicles", 2, "--budget", "30km", "--iterations", 20_000, "--json", *SOUTH)
+    ran = console.mission(*words)
+    assert ran.code == 0, ran.err
+    result, folder = ran.result, tmp_path / "missions/m"
+    rounds = result["rounds"]
+    assert result["flyable"]
+    assert rounds == [1, 1, 2, 2]
+    plans = [read_plan(Path(path)) for path in result["plans"]]
+    assert all(time_plan(plan, QUAD).used_s <= 1680.0 for plan in plans)
+    assert len({home_of(path) for path in result["plans"]}) == 2
+    assert any(
+        f"{len(rounds)} flights in {max(rounds)} rounds of 2 vehicles at once" in one for one in result["warnings"]
+    )
+    assert read_sidecar(folder / "m.npz").rounds == {f"m-{k}.plan": number for k, number in enumerate(rounds, start=1)}
+    checked = console("sparsor", "check", folder, "--json")
+    assert checked.code == 0, checked.out
+    assert checked.result["vehicles_apart_m"] == pytest.approx(result["vehicles_apart_m"], abs=0.05)
+    assert result["vehicles_apart_m"] >= 10.0
+
+    for path, plan in zip(result["plans"], plans, strict=True):
+        assert prepare_practice(PracticeRequest(mission=Path(path))).settings.home == plan.home
+
+    # Plans of another round may be in the same place, those of one round may not.
+    files = [Path(path) for path in result["plans"]]
+    for to, of in zip(files[2:], files[:2], strict=True):
+        to.write_bytes(of.read_bytes())
+    ran = console("sparsor", "check", folder)
+    assert "may come as near" not in ran.out
+    files[1].write_bytes(files[0].read_bytes())
+    ran = console("sparsor", "check", folder)
+    assert ran.code == 1
+    assert "m-1.plan and m-2.plan may come as near as 0.0 m" in ran.out
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sparsor.design import Candidate
+from sparsor.errors import MissionError
+from sparsor.journeys.fleet import cut_for_vehicles
 from sparsor.journeys.flights import Flights
 from sparsor.journeys.preparing import prepare
 from sparsor.journeys.sorties import Sorties, cut_into_sorties
 from sparsor.mission import Home, time_plan
+from sparsor.mission.separation import nearest
 from sparsor.mission.specification import specification
 from sparsor.vehicle import usable_seconds
 
@@ -47,3 +50,33 @@ def test_no_sortie_is_beyond_the_endurance_and_every_stop_in_one(prepared, seed,
         assert time == time_plan(plan, ready.vehicle, ready.wind)
         assert time.used_s <= usable_seconds(ready.vehicle)
         assert any(np.allclose((plan.home.lon_deg, plan.home.lat_deg), place, atol=1e-6) for place in places)
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 10_000), vehicles=st.integers(2, 3), own=st.booleans(), hold_s=st.sampled_from([0.0, 150.0]))
+def test_vehicles_at_once_take_off_as_often_as_their_batteries_need(seed, vehicles, own, hold_s):
+    flight = {"vehicle": "quad", "vehicles": vehicles, "hold_s": hold_s, "separation_m": 12.0}
+    spec = specification({"name": "m", "area": {"bbox": BOX}, "flight": flight}, base=Path())
+    ready = prepare(spec)
+    rng = np.random.default_rng(seed)
+    stops = rng.permutation(1024)[: rng.integers(3, 24)]
+    places = rng.uniform((51.50, 25.27), (51.53, 25.30), (vehicles if own else 1, 2))
+    route = Candidate(0, 0.0, 0.0, 0.0, 0.0, np.zeros((1, 1024), dtype=bool), stops, 0.0, 0)
+    flights = Flights(spec, ready, route, tuple(Home(*place) for place in places))
+    try:
+        cut = cut_for_vehicles(flights)
+    except MissionError as error:
+        assert own, error  # places beside one home are always found for these
+        assert "cannot be kept 12 m apart" in str(error)
+        return
+    assert isinstance(cut, Sorties)
+    assert sorted(np.concatenate(cut.orders).tolist()) == list(range(stops.size))
+    assert all(time.used_s <= usable_seconds(ready.vehicle) for time in cut.times)
+    assert list(cut.rounds) == sorted(cut.rounds)
+    for number in range(1, max(cut.rounds) + 1):
+        plans = [plan for plan, its in zip(cut.plans, cut.rounds, strict=True) if its == number]
+        assert 1 <= len(plans) <= vehicles
+        assert nearest(plans, ready.vehicle).distance_m >= 12.0 - 1e-6
+    assert len({plan.home for plan in cut.plans}) <= vehicles
+    if max(cut.rounds) > 1:  # and not more often than they need
+        assert sum(time.used_s for time in cut.times) > 0.6 * (max(cut.rounds) - 1) * usable_seconds(ready.vehicle)

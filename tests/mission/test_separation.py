@@ -116,7 +116,7 @@ def test_planned_vehicles_are_never_nearer_than_stated(seed, vehicles, lat, sepa
         separation_m=separation_m,
     )
     assume(found is not None)
-    assert found.nearest.distance_m >= separation_m - 1e-6
+    assert found.distance_m >= separation_m - 1e-6
     ways = [sampled(plan) for plan in found.plans]
     for place, one in enumerate(ways):
         for other in ways[:place]:
@@ -140,8 +140,8 @@ def test_each_kind_flies_at_once_from_homes_of_their_own(vehicle):
         separation_m=10.0,
     )
     assert found is not None
-    assert found.nearest == nearest(found.plans, vehicle)
-    assert found.nearest.distance_m >= 10.0
+    assert found.distance_m == nearest(found.plans, vehicle).distance_m
+    assert found.distance_m >= 10.0
 
 
 def test_a_plane_is_wider_than_its_legs():
@@ -174,6 +174,26 @@ def test_the_same_place_or_a_way_on_the_ground_is_refused():
         return build(number, home, altitude_m, ROVER)
 
     assert flights_apart(driven, ways, same[:1], vehicle=ROVER, lowest_m=0.0, separation_m=10.0) is None
+
+
+def test_flights_of_different_rounds_stand_in_the_same_places_and_may_cross():
+    rng = np.random.default_rng(5)
+    stops = [around(rng, 0.01, 25.3, 4) for _ in range(5)]
+
+    def build(number, home, altitude_m):
+        return build_mission(*stops[number].T, vehicle=QUAD, autopilot="px4", altitude_m=altitude_m, home=home)
+
+    rounds = (1, 1, 2, 2, 3)
+    found = flights_apart(
+        build, [(tuple(one[0]), tuple(one[-1])) for one in stops], [Home(51.5, 25.31)], vehicle=QUAD, lowest_m=30.0,
+        separation_m=12.0, rounds=rounds,
+    )  # fmt: skip
+    assert found is not None
+    assert len({(plan.home.lon_deg, plan.home.lat_deg) for plan in found.plans}) == 2
+    assert [sorted(found.heights_m[k : k + 2]) for k in (0, 2, 4)] == [[30.0, 42.0], [30.0, 42.0], [30.0]]
+    pairs = [nearest(found.plans[k : k + 2], QUAD).distance_m for k in (0, 2)]
+    assert found.distance_m == min(pairs) >= 12.0
+    assert nearest(found.plans, QUAD).distance_m < 1.0  # all at once they would not be apart
 
 
 def test_a_home_on_a_hill_counts_where_its_height_is_known():

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sparsor.mission.fleet import balanced_flights, cut_evenly, longest_s
+from sparsor.mission.fleet import balanced_flights, cut_evenly, in_rounds, longest_s
 from sparsor.mission.sorties import SortieCosts, best_sorties, cut_route, routed
 
 
@@ -101,29 +101,33 @@ def test_a_flight_begins_and_ends_at_the_best_home(given_costs: SortieCosts) -> 
 
 
 @settings(max_examples=40, deadline=None)
-@given(costs(most=7, homes=1), st.integers(1, 4), st.booleans(), st.integers(0, 99))
-def test_no_cut_for_several_vehicles_has_a_shorter_longest_flight(given_costs, vehicles, own, seed) -> None:
-    if own and vehicles > 1:
+@given(costs(most=6, homes=1), st.integers(1, 3), st.integers(1, 2), st.booleans(), st.integers(0, 99))
+def test_no_cut_for_several_vehicles_has_a_shorter_longest_flight(given_costs, vehicles, rounds, own, seed) -> None:
+    own = own and vehicles > 1
+    if own:
         farther = np.random.default_rng(seed).uniform(0, 300, (vehicles, 1))
         given_costs = replace(
             given_costs, out_s=given_costs.out_s + farther, back_s=given_costs.back_s + farther
         )  # fmt: skip
     count = given_costs.count
+    taken = [home for home in range(vehicles) for _ in range(rounds)] if own else [0] * (vehicles * rounds)
     least = min(
         max(given_costs.used_s(part, home) for part, home in zip(parts, homes, strict=True))
         for cuts in itertools.product([False, True], repeat=count - 1)
         for parts in [_parts(count, cuts)]
-        if len(parts) <= vehicles
-        for homes in (itertools.permutations(range(vehicles), len(parts)) if own else [(0,) * len(parts)])
+        if len(parts) <= vehicles * rounds
+        for homes in set(itertools.permutations(taken, len(parts)))
     )
-    even = cut_evenly(given_costs, vehicles)
+    even = cut_evenly(given_costs, vehicles, rounds)
     assert np.isclose(longest_s(given_costs, even), least)
-    found = balanced_flights(given_costs, vehicles, iterations=20)
-    assert sorted(itertools.chain(*(stops for _, stops in found))) == list(range(count))
-    assert len(found) <= vehicles
+    found = balanced_flights(given_costs, vehicles, rounds=rounds, iterations=20)
     assert longest_s(given_costs, found) <= longest_s(given_costs, even) + 1e-9
-    if own:
-        assert len({home for home, _ in found}) == len(found)
+    by_round = in_rounds(found, vehicles, own=own)
+    assert len(by_round) <= rounds
+    assert sorted(itertools.chain(*(stops for one in by_round for _, stops in one))) == list(range(count))
+    for flights in by_round:
+        assert 1 <= len(flights) <= vehicles
+        assert not own or len({home for home, _ in flights}) == len(flights)
 
 
 def simple_cut(given_costs: SortieCosts) -> list[list[int]]:

@@ -52,7 +52,7 @@ def picture_of(box_deg: tuple[float, float, float, float], stops: int = 12) -> M
         stops=route,
         route=route,
         transits=(route[[-1, 0]],),
-        home=(float(route[0, 0]), float(route[0, 1])),
+        homes=((float(route[0, 0]), float(route[0, 1])),),
         fence=corners,
         area=(corners[:3],),
         outside=np.arange(1024) % 32 > 28,
@@ -103,7 +103,7 @@ def test_what_is_not_given_is_not_needed() -> None:
         {"prior": None},
         {"route": None},
         {"stops": None},
-        {"home": None},
+        {"homes": ()},
         {"stops": full.stops[:1]},
     ):
         assert size_of(mission_preview(replace(full, **missing)))[0] == 1400
@@ -128,8 +128,8 @@ def test_words_are_taken_as_they_are_and_never_leave_the_page() -> None:
 
 
 def test_many_stops_and_a_home_far_away() -> None:
-    picture = replace(picture_of(BOXES["doha"], 400), home=(-70.0, 10.0))
-    assert view_of(picture) == view_of(replace(picture, home=None))
+    picture = replace(picture_of(BOXES["doha"], 400), homes=((-70.0, 10.0),))
+    assert view_of(picture) == view_of(replace(picture, homes=()))
     assert nothing_is_cut_off(mission_preview(picture))
 
 

@@ -256,7 +256,8 @@ def plan(
         typer.Option("--drop-unreachable", help="Leave out stops beyond reach of one battery.", rich_help_panel=FLIGHT),
     ] = False,
     vehicles: Annotated[
-        int | None, _option(FLIGHT, "Fly with this many at once, 1..8, each on a part of the route.", "--vehicles")
+        int | None,
+        _option(FLIGHT, "Fly with this many at once, 1..8, each on a part; in rounds if need be.", "--vehicles"),
     ] = None,
     separation: Annotated[
         float | None,

@@ -34,12 +34,20 @@ def simulate(
     mission: Annotated[
         Path | None,
         _option(
-            VEHICLE, "Rehearse this mission: its home, autopilot, vehicle, sensor and box.", "--mission", metavar="DIR"
+            VEHICLE,
+            "Rehearse this mission, or this plan of it: home, autopilot, vehicle, sensor and box.",
+            "--mission",
+            metavar="DIR|FILE.plan",
         ),
     ] = None,
     home: Annotated[
         tuple[float, float] | None,
-        _option(VEHICLE, "Where it stands (default: the mission's home).", "--home", metavar="LON LAT"),
+        _option(
+            VEHICLE,
+            "Where it stands (default: home of the plan, or of the first).",
+            "--home",
+            metavar="LON LAT",
+        ),
     ] = None,
     home_altitude: Annotated[
         float | None,

@@ -37,6 +37,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "stops_dropped": int(mission.sorties.dropped.size) if mission.sorties else 0,
         "vehicles": spec.flight.vehicles,
         "vehicles_apart_m": mission.sorties.apart_m if mission.sorties else None,
+        "rounds": list(mission.sorties.rounds) if mission.sorties else [],
         "sortie_times_s": [time.seconds for time in mission.sorties.times] if mission.sorties else [],
         "expected_relative_error": mission.expected_relative_error,
         "expected_relative_error_cells": mission.expected_relative_error_cells,
@@ -171,12 +172,16 @@ def _flyable(mission: PlannedMission) -> str:
         return "yes, by endurance"
     if len(mission.plans) == 1:
         return f"yes, by endurance, in another order: {mission.sorties.times[0].seconds / 60:.1f} min"
+    minutes = [f"{one.seconds / 60:.1f}" for one in mission.sorties.times]
+    rounds = mission.sorties.rounds
+    if max(rounds, default=1) > 1:
+        each = [
+            ", ".join(its for its, number in zip(minutes, rounds, strict=True) if number == one)
+            for one in range(1, max(rounds) + 1)
+        ]
+        return f"in {len(minutes)} flights, {len(each)} rounds: {'; '.join(each)} min"
     kind = "sorties" if mission.sorties.apart_m is None else "flights at once"
-    return (
-        f"in {len(mission.plans)} {kind}: "
-        + ", ".join(f"{one.seconds / 60:.1f}" for one in mission.sorties.times)
-        + " min"
-    )
+    return f"in {len(minutes)} {kind}: {', '.join(minutes)} min"
 
 
 def _of_the_battery(mission: PlannedMission) -> str:

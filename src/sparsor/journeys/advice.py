@@ -12,6 +12,7 @@ from sparsor.vehicle import flight_seconds
 
 if TYPE_CHECKING:
     from sparsor.journeys.planning import PlannedMission
+    from sparsor.journeys.sorties import Sorties
 
 _HARDLY_BETTER = 0.9
 _FAR_HOME = 3.0  # diagonals of the box
@@ -55,15 +56,15 @@ def _cut_into(mission: PlannedMission) -> str:
     assert cut is not None
     usable_min = mission.usable_s / 60
     if cut.apart_m is not None:
-        heights = ", ".join(f"{height_m:g}" for height_m in cut.heights_m)
+        heights = ", ".join(f"{height_m:g}" for height_m in sorted({*cut.heights_m}))
         up = f", at {heights} m (ceiling {mission.vehicle.ceiling_m:g} m)" if mission.vehicle.flies else ""
         level = ", if the homes lie level" if up else ""
-        places = "; ".join(f"{plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}" for plan in cut.plans)
+        homes = dict.fromkeys(f"{plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}" for plan in cut.plans)
         return (
-            f"{len(cut.plans)} vehicles at once, none above {max(time.used_s for time in cut.times) / 60:.1f} of "
-            f"{usable_min:.1f} min{up}, each from a home of its own (see whether it can be used): {places}. Their "
-            f"planned paths are never nearer than {_tenth_down(cut.apart_m)} m, whenever each starts{level}; what they "
-            "drift off their paths comes off that."
+            f"{_at_once(cut)}, none above {max(time.used_s for time in cut.times) / 60:.1f} of "
+            f"{usable_min:.1f} min{up}, each vehicle from a home of its own (see whether it can be used): "
+            f"{'; '.join(homes)}. Planned paths are never nearer than {_tenth_down(cut.apart_m)} m, whenever each "
+            f"starts{level}; what vehicles drift off their paths comes off that."
         )
     if len(cut.plans) > 1:
         return (
@@ -77,6 +78,17 @@ def _cut_into(mission: PlannedMission) -> str:
     if cut.dropped.size:
         return f"The others are one flight of {used}."
     return f"The route as it was found takes more than one battery; its stops in another order take {used}."
+
+
+def _at_once(cut: Sorties) -> str:
+    """Return how many fly at once, and how often."""
+    vehicles = max(map(cut.rounds.count, cut.rounds))
+    if max(cut.rounds) == 1:
+        return f"{vehicles} vehicles at once"
+    return (
+        f"One battery each is not enough: {len(cut.plans)} flights in {max(cut.rounds)} rounds of {vehicles} vehicles "
+        "at once (nobody takes off before all of the round before have landed)"
+    )
 
 
 def _tenth_down(metres: float) -> str:

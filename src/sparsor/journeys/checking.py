@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,7 +42,7 @@ class Check:
         Sentences: what a plan fails by, and what has to be known. No fault means that none was noticed; it says
         nothing of rules, obstacles or terrain.
     apart_m : float or None
-        Of the plans of vehicles at once: their planned paths are never nearer, whenever each starts.
+        Of the plans of vehicles at once: in no round are their planned paths nearer, whenever each starts.
     """
 
     plans: tuple[Path, ...]
@@ -101,14 +102,20 @@ def _apart(folder: Path, plans: tuple[Path, ...], vehicle: str | None) -> tuple[
     profile = (profile_of(own[0]) if vehicle is None else load_vehicle(vehicle)) if own else None
     if spec.flight.vehicles == 1 or len(own) < 2 or profile is None:
         return None, ()
-    found = nearest([read_plan(one) for one in own], profile)
-    apart_m, least_m = found.distance_m, spec.flight.separation_m
-    if apart_m >= least_m - TOLERANCE_M:
-        return apart_m, ()
-    return apart_m, (
-        f"{own[found.first].name} and {own[found.second].name} may come as near as {apart_m:.1f} m to each other when "
-        f"they are flown at once; the mission asks for {least_m:g} m.",
-    )
+    sidecar = sidecar_of(own[0])
+    round_of = {} if sidecar is None else sidecar.rounds
+    at_once = [[one for one in own if round_of.get(one.name, 1) == number] for number in {1, *round_of.values()}]
+    least_m = spec.flight.separation_m
+    nearest_m, faults = math.inf, []
+    for files in at_once:
+        found = nearest([read_plan(one) for one in files], profile)
+        nearest_m = min(nearest_m, found.distance_m)
+        if found.distance_m < least_m - TOLERANCE_M:
+            faults.append(
+                f"{files[found.first].name} and {files[found.second].name} may come as near as {found.distance_m:.1f} "
+                f"m to each other when they are flown at once; the mission asks for {least_m:g} m."
+            )
+    return (nearest_m if nearest_m < math.inf else None), tuple(faults)
 
 
 def _faults(path: Path, vehicle: str | None, terrain: Path | None, clearance_m: float | None) -> list[Fault]:

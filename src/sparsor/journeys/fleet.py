@@ -10,10 +10,11 @@ import numpy as np
 from sparsor.errors import MissionError
 from sparsor.journeys.sorties import MARGIN_S, Sorties, alone_seconds, sortie_costs, within_reach
 from sparsor.mission.apart import flights_apart
-from sparsor.mission.fleet import balanced_flights, cut_evenly, longest_s
-from sparsor.vehicle import usable_seconds
+from sparsor.mission.fleet import MOST_TRIES, SHORTER, balanced_flights, cut_evenly, in_rounds, longest_s
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from sparsor.journeys.flights import Flights
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from sparsor.mission import Home, MissionPlan
     from sparsor.mission.fleet import Cut
     from sparsor.mission.sorties import SortieCosts
-
+# How much shorter than the route's even parts PyVRP's flights may come out.
+HOPELESS = SHORTER**-MOST_TRIES
 FAILSAFE = (
     "A failsafe return flies straight home at the vehicle's own return height, through the others' heights: set "
     "RTL_ALT (PX4: RTL_RETURN_ALT) of each vehicle to the height of its own plan, and expect less distance when one "
@@ -30,39 +32,47 @@ FAILSAFE = (
 
 
 def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorties | str:
-    """Return one flight a vehicle, all at once, or a sentence that says why there are none; parameters as for sorties.
+    """Return flights of several vehicles at once, in as few rounds as their batteries allow; parameters as for sorties.
+
+    Or a sentence that says why there are none.
 
     Raises
     ------
     MissionError
         When they cannot be kept apart.
     """
-    flight, vehicle = flights.spec.flight, flights.prepared.vehicle
+    flight = flights.spec.flight
     highest_m = _highest_m(flights)
     alone_s = alone_seconds(flights, flights.homes, highest_m)
     kept, said = within_reach(flights, alone_s)
     if said:
         return said
     costs = sortie_costs(flights, flights.homes, kept, alone_s[:, kept])
-    cut = _balanced(flights, costs, kept, error)
-    sorties = _apart(flights, [(home, kept[stops].tolist()) for home, stops in cut])
-    usable_s = usable_seconds(vehicle)
-    longest_used_s = max(time.used_s for time in sorties.times)
-    if longest_used_s > usable_s:
-        return (
-            f"{flight.vehicles} vehicles at once are not enough for the route: the longest flight would take "
-            f"{longest_used_s / 60:.1f} of {usable_s / 60:.1f} min. Take more --vehicles, or leave them out and fly "
-            "one sortie after the other."
-        )
-    return replace(sorties, dropped=np.setdiff1d(np.arange(flights.stops.size), kept))
+    for rounds in range(1, -(-kept.size // flight.vehicles) + 1):
+        even = cut_evenly(costs, flight.vehicles, rounds)
+        if longest_s(costs, even) > HOPELESS * costs.limit_s:
+            continue
+        cut = _balanced(flights, costs, kept, even, rounds, error)
+        if longest_s(costs, cut) > costs.limit_s - MARGIN_S:
+            continue
+        by_round = in_rounds(cut, flight.vehicles, own=costs.homes > 1)
+        sorties = _apart(flights, [[(home, kept[stops]) for home, stops in one] for one in by_round])
+        if all(time.used_s <= costs.limit_s for time in sorties.times):
+            return replace(sorties, dropped=np.setdiff1d(np.arange(flights.stops.size), kept))
+    return (
+        f"It is not cut for {flight.vehicles} vehicles at once: what a flight takes beside its stops, from a place of "
+        "its own, leaves no room for any. Take off nearer (--home LON LAT, once a vehicle), or leave --vehicles out "
+        "and fly one sortie after the other."
+    )
 
 
-def _balanced(flights: Flights, costs: SortieCosts, kept: NDArray[np.int64], error: OrderError | None) -> Cut:
+def _balanced(
+    flights: Flights, costs: SortieCosts, kept: NDArray[np.int64], even: Cut, rounds: int, error: OrderError | None
+) -> Cut:
     """Return flights whose longest is short; in another order than the route's where the map does not lose by it."""
-    vehicles = min(flights.spec.flight.vehicles, kept.size)
-    found = balanced_flights(costs, vehicles, seed=flights.spec.search.seed)
-    even = cut_evenly(costs, vehicles)
-    if error is None or found == even or longest_s(costs, even) > costs.limit_s - MARGIN_S:
+    spec = flights.spec
+    found = balanced_flights(costs, spec.flight.vehicles, rounds=rounds, seed=spec.search.seed)
+    if error is None or found == even:
         return found
     lost = error([kept[stops] for _, stops in found]) > error([kept[stops] for _, stops in even])
     return even if lost else found
@@ -89,9 +99,17 @@ def _highest_m(flights: Flights) -> float:
     return highest_m
 
 
-def _apart(flights: Flights, cut: Cut) -> Sorties:
+def _apart(flights: Flights, cut: Sequence[Sequence[tuple[int, NDArray[np.int64]]]]) -> Sorties:
+    """Return the flights of each round, by their homes and places on the route, so that they are apart.
+
+    Raises
+    ------
+    MissionError
+        When they cannot be.
+    """
     flight, vehicle = flights.spec.flight, flights.prepared.vehicle
-    orders = [np.array(stops, dtype=np.int64) for _, stops in cut]
+    each = [(number, home, order) for number, one in enumerate(cut, start=1) for home, order in one]
+    rounds, orders = tuple(number for number, *_ in each), tuple(order for *_, order in each)
     zones = flights.prepared.place.zones
 
     def build(number: int, home: Home, altitude_m: float) -> MissionPlan | None:
@@ -108,21 +126,26 @@ def _apart(flights: Flights, cut: Cut) -> Sorties:
     for order in orders:
         lon, lat = flights.prepared.place.grid.centres_deg(flights.stops[order[[0, -1]]])
         ends.append(((float(lon[0]), float(lat[0])), (float(lon[1]), float(lat[1]))))
-    own = [flights.homes[home] for home, _ in cut] if len(flights.homes) > 1 else flights.homes[:1]
+    own = len(flights.homes) > 1
     found = flights_apart(
-        build, ends, own, vehicle=vehicle, lowest_m=flight.altitude_m, separation_m=flight.separation_m
+        build,
+        ends,
+        [flights.homes[home] for _, home, _ in each] if own else flights.homes[:1],
+        vehicle=vehicle,
+        lowest_m=flight.altitude_m,
+        separation_m=flight.separation_m,
+        rounds=rounds,
     )
     if found is None:
-        raise MissionError(_not_apart(flights, len(cut)))
-    plans = tuple(found.plans)
-    apart_m = found.nearest.distance_m if len(plans) > 1 else None
+        raise MissionError(_not_apart(flights, max(map(len, cut))))
     return Sorties(
-        plans,
-        tuple(flights.time(plan) for plan in plans),
-        tuple(orders),
+        found.plans,
+        tuple(flights.time(plan) for plan in found.plans),
+        orders,
         np.empty(0, dtype=np.int64),
-        apart_m=apart_m,
+        apart_m=found.distance_m if max(map(len, cut)) > 1 else None,
         heights_m=found.heights_m,
+        rounds=rounds,
     )
 
 

@@ -171,6 +171,7 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
         passing=tuple(passed),
         flown=np.zeros(0, dtype=np.int64) if before is None else before.stops,
         heights_m=_heights_m(mission),
+        rounds=_rounds(mission),
         above_ground=mission.ground is not None,
         way=_way(mission),
     )
@@ -184,6 +185,12 @@ def _heights_m(mission: PlannedMission) -> tuple[float, ...]:
         return new
     one = (mission.specification.flight.altitude_m,)
     return tuple(sorted({*(new or one), *(old or one)}))
+
+
+def _rounds(mission: PlannedMission) -> dict[str, int]:
+    """Return the round of each plan, where there are several."""
+    rounds = () if mission.sorties is None else mission.sorties.rounds
+    return dict(zip(mission.plan_files, rounds, strict=True)) if max(rounds, default=1) > 1 else {}
 
 
 def _way(mission: PlannedMission) -> NDArray[np.float64]:

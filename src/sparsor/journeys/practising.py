@@ -24,7 +24,7 @@ from sparsor.link.practice import (
 )
 from sparsor.link.practice.motion import AIRSPEED_PER_CRUISE
 from sparsor.link.practice.place import FlatMap
-from sparsor.mission import Home
+from sparsor.mission import Home, read_plan
 from sparsor.mission.sidecar import Sidecar, read_sidecar
 from sparsor.mission.specification import read_specification
 from sparsor.prior.reading import read_field
@@ -84,7 +84,7 @@ class PracticeRequest:
     Parameters
     ----------
     mission : Path, optional
-        Folder of the mission to rehearse, or its .plan.
+        Folder of the mission to rehearse; or one of its plans, at whose home the vehicle then stands.
     home : tuple of float, optional
         Longitude and latitude; needed without a mission.
     home_altitude_m : float, optional
@@ -202,13 +202,17 @@ def write_truth(practice: Practice, path: Path) -> None:
 
 
 def _read_mission(path: Path) -> tuple[MissionSpecification, Sidecar]:
-    folder = path.parent if path.suffix == ".plan" and path.is_file() else path
+    folder = path.parent if _is_plan(path) else path
     if not (folder / SPECIFICATION_FILE).is_file():
         raise MissionError(
             f"'{folder}' is not a mission folder: it has no {SPECIFICATION_FILE}; make one with 'sparsor plan'"
         )
     spec = read_specification(folder / SPECIFICATION_FILE)
     return spec, read_sidecar(folder / f"{spec.name}.npz")
+
+
+def _is_plan(path: Path) -> bool:
+    return path.suffix == ".plan" and path.is_file()
 
 
 def _home(request: PracticeRequest, mission: tuple[MissionSpecification, Sidecar] | None) -> Home:
@@ -218,6 +222,9 @@ def _home(request: PracticeRequest, mission: tuple[MissionSpecification, Sidecar
     if mission is None:
         raise InputError("where does the vehicle stand? Give --home LON LAT, or --mission DIR of a planned mission")
     lon, lat, altitude_m = mission[1].home
+    if request.mission is not None and _is_plan(request.mission):
+        its = read_plan(request.mission).home
+        lon, lat, altitude_m = its.lon_deg, its.lat_deg, its.alt_amsl_m
     if asked_m is not None:
         return Home(lon, lat, asked_m, altitude_known=True)
     return Home(lon, lat, altitude_m, altitude_known=mission[1].home_altitude_known)

@@ -11,7 +11,7 @@ from sparsor.mission import transits
 from sparsor.plot import MissionPicture, mission_preview
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
@@ -28,9 +28,8 @@ LONGEST_NAME = 18  # that the legend has room for
 
 def preview_png(mission: PlannedMission) -> bytes:
     """Return ``preview.png`` of a mission."""
-    place, plan = mission.place, mission.plans[0]
+    place = mission.place
     stops = np.concatenate(list(map(_stops, mission.plans)))
-    home = np.array([plan.home.lon_deg, plan.home.lat_deg])
     prior, label = _prior_map(mission)
     return mission_preview(
         MissionPicture(
@@ -46,7 +45,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             route=stops if mission.sorties is None else None,
             sorties=() if mission.sorties is None else tuple(map(_stops, mission.plans)),
             transits=_ways(mission),
-            home=(float(home[0]), float(home[1])),
+            homes=tuple(dict.fromkeys((plan.home.lon_deg, plan.home.lat_deg) for plan in mission.plans)),
             fence=_fence(mission),
             area=() if place.area is None else _rings(mission),
             keep_outs=_keep_outs(place),
@@ -151,7 +150,7 @@ def _caption(mission: PlannedMission) -> tuple[str, ...]:
     return (
         f"{found.stops.size} stops, {mission.path_length_m / 1000:.1f} km over the stops "
         f"({mission.coverage_fraction:.1%} of full coverage), "
-        f"{mission.specification.flight.altitude_m:g} m above {'home' if mission.ground is None else 'the ground'}.",
+        f"{_heights(mission)} m above {'home' if mission.ground is None else 'the ground'}.",
         f"{_minutes(mission)} min in the air; {mission.vehicle.name}: {mission.usable_s / 60:.0f} min "
         f"less its reserve{'' if mission.flyable else ' - a planning study, not flyable'}.",
         f"Expected error {mission.expected_relative_error:.2f} of the map's contrast (|s - s'| / |s - mean(s)|).",
@@ -159,7 +158,23 @@ def _caption(mission: PlannedMission) -> tuple[str, ...]:
     )
 
 
+def _heights(mission: PlannedMission) -> str:
+    at_once = () if mission.sorties is None else mission.sorties.heights_m
+    return _listed(sorted({*at_once}) or [mission.specification.flight.altitude_m], "{:g}")
+
+
 def _minutes(mission: PlannedMission) -> str:
-    times = [mission.flight_time_s] if mission.sorties is None else [time.seconds for time in mission.sorties.times]
-    *before, last = [f"{seconds / 60:.0f}" for seconds in times]
+    """Return the minutes of each flight, round by round."""
+    if mission.sorties is None:
+        return f"{mission.flight_time_s / 60:.0f}"
+    rounds = mission.sorties.rounds or (1,) * len(mission.plans)
+    each = zip(mission.sorties.times, rounds, strict=True)
+    minutes = [(time.seconds / 60, number) for time, number in each]
+    return ", then ".join(
+        _listed([its for its, number in minutes if number == one], "{:.0f}") for one in sorted({*rounds})
+    )
+
+
+def _listed(numbers: Sequence[float], form: str) -> str:
+    *before, last = map(form.format, numbers)
     return f"{', '.join(before)} and {last}" if before else last

@@ -42,6 +42,9 @@ class Sorties:
         Of flights at once: two are never nearer, whenever each of them starts.
     heights_m : tuple of float
         Of flights at once, above home.
+    rounds : tuple of int
+        Of flights at once, the round of each, from 1: those of one round are in the air together, and nobody takes off
+        before all of the round before have landed.
     """
 
     plans: tuple[MissionPlan, ...]
@@ -50,6 +53,7 @@ class Sorties:
     dropped: NDArray[np.int64]
     apart_m: float | None = None
     heights_m: tuple[float, ...] = ()
+    rounds: tuple[int, ...] = ()
 
 
 def cut_into_sorties(flights: Flights, error: OrderError | None = None) -> Sorties | str:

@@ -2,21 +2,23 @@
 
 Each vehicle has a height of its own, a separation above the one before, and a place of its own, where it climbs and
 lands. What is left to decide is who is higher: who climbs past the height of another must not do so near its way.
+Flights of different rounds are never in the air together; their vehicles stand in the same places.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sparsor.geodesy.lengths import distance_m, wgs84
-from sparsor.mission.separation import Nearest, Swept, apart_m, nearest, swept
+from sparsor.mission.separation import Swept, apart_m, nearest, swept
 from sparsor.vehicle import approach_m
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,20 +36,20 @@ TOLERANCE_M = 1e-6
 
 @dataclass(frozen=True)
 class Apart:
-    """Flights that are apart at all times.
+    """Flights of which those at once are apart at all times.
 
     Parameters
     ----------
     plans : tuple of MissionPlan
         In the order of the flights that were given.
     heights_m : tuple of float
-    nearest : Nearest
-        What `nearest` says of them.
+    distance_m : float
+        Which no two of one round are nearer than; infinite where there are no two.
     """
 
     plans: tuple[MissionPlan, ...]
     heights_m: tuple[float, ...]
-    nearest: Nearest
+    distance_m: float
 
 
 def flights_apart(
@@ -58,6 +60,7 @@ def flights_apart(
     vehicle: Vehicle,
     lowest_m: float,
     separation_m: float,
+    rounds: Sequence[int] | None = None,
 ) -> Apart | None:
     """Return flights that are never nearer to each other than the separation, None where none were found.
 
@@ -71,41 +74,52 @@ def flights_apart(
         One for each flight; or one alone, beside which places are looked for: in a line, in all directions.
     vehicle : Vehicle
     lowest_m, separation_m : float
-        Height of the lowest flight, and the distance to keep, which is also that between two heights.
+        Height of the lowest flight of each round, and the distance to keep, which is also that between two heights.
+    rounds : sequence of int, optional
+        In which round each flight is flown; default: all at once.
     """
+    numbers = np.zeros(len(ways), dtype=np.int64) if rounds is None else np.asarray(rounds)
+    at_once = [np.flatnonzero(numbers == number).tolist() for number in np.unique(numbers)]
+    own = len(homes) == len(ways)
+    tried = [tuple(homes)] if own else _places(homes[0], ways, at_once, vehicle, lowest_m, separation_m)
     step_m = separation_m if vehicle.flies else 0.0
-    tried = [tuple(homes)] if len(homes) == len(ways) else _places(homes[0], ways, vehicle, lowest_m, separation_m)
     for places in tried:
-        found = _apart(build, places, vehicle, lowest_m, step_m, separation_m)
-        if found is not None:
-            return found
+        found: dict[int, tuple[MissionPlan, float]] = {}
+        distance_m = math.inf
+        for flights in at_once:
+            apart = _apart(build, {one: places[one] for one in flights}, vehicle, lowest_m, step_m, separation_m)
+            if apart is None:
+                break
+            found |= apart[0]
+            distance_m = min(distance_m, apart[1])
+        else:
+            plans, heights_m = zip(*(found[number] for number in range(len(ways))), strict=True)
+            return Apart(plans, heights_m, distance_m)
     return None
 
 
 def _apart(
-    build: Build,
-    places: Sequence[Home],
-    vehicle: Vehicle,
-    lowest_m: float,
-    step_m: float,
-    separation_m: float,
-) -> Apart | None:
-    highest_m = lowest_m + step_m * (len(places) - 1)
+    build: Build, homes: Mapping[int, Home], vehicle: Vehicle, lowest_m: float, step_m: float, separation_m: float
+) -> tuple[dict[int, tuple[MissionPlan, float]], float] | None:
+    """Return plans and heights of flights at once, and how far apart they are; None where they are not."""
+    highest_m = lowest_m + step_m * (len(homes) - 1)
     low, high = (
-        [swept(plan, vehicle) for number, home in enumerate(places) if (plan := build(number, home, height_m))]
+        [swept(plan, vehicle) for number, home in homes.items() if (plan := build(number, home, height_m))]
         for height_m in (lowest_m, highest_m)
     )
-    order = _lowest_first(low, high, separation_m) if len(low) == len(high) == len(places) else None
+    order = _lowest_first(low, high, separation_m) if len(low) == len(high) == len(homes) else None
     if order is None:
         return None
-    heights = np.empty(len(places))
-    heights[order] = lowest_m + step_m * np.arange(len(places))
-    built = [build(number, home, float(heights[number])) for number, home in enumerate(places)]
-    plans = tuple(plan for plan in built if plan is not None)
-    if len(plans) < len(places):
+    numbers = list(homes)
+    heights_m = {numbers[place]: lowest_m + step_m * rank for rank, place in enumerate(order)}
+    built = {number: build(number, home, heights_m[number]) for number, home in homes.items()}
+    plans = {number: plan for number, plan in built.items() if plan is not None}
+    if len(plans) < len(homes):
         return None
-    found = nearest(plans, vehicle)
-    return Apart(plans, tuple(heights.tolist()), found) if found.distance_m >= separation_m - TOLERANCE_M else None
+    distance_m = nearest(list(plans.values()), vehicle).distance_m
+    if distance_m < separation_m - TOLERANCE_M:
+        return None
+    return {number: (plan, heights_m[number]) for number, plan in plans.items()}, distance_m
 
 
 def _lowest_first(low: Sequence[Swept], high: Sequence[Swept], separation_m: float) -> list[int] | None:
@@ -140,11 +154,17 @@ def _waits(below: NDArray[np.bool_], one: int, order: Sequence[int]) -> bool:
 
 
 def _places(
-    home: Home, ways: Sequence[tuple[Point, Point]], vehicle: Vehicle, lowest_m: float, separation_m: float
+    home: Home,
+    ways: Sequence[tuple[Point, Point]],
+    at_once: Sequence[list[int]],
+    vehicle: Vehicle,
+    lowest_m: float,
+    separation_m: float,
 ) -> Iterator[tuple[Home, ...]]:
     """Yield places for the flights in a line from home, each way round, farther and farther apart.
 
-    A flight that goes farther along the line has a place farther along it, so that the ways from home do not cross.
+    A flight that goes farther along the line than others of its round has a place farther along it, so that the ways
+    from home do not cross.
     """
     wide_m = 4.0 * vehicle.turn_radius_m + approach_m(vehicle, lowest_m) if vehicle.circles else 0.0
     base = (home.lon_deg, home.lat_deg)
@@ -157,7 +177,8 @@ def _places(
                 line_deg = float(ahead_deg[0]) + side + float(turned_deg)
                 along_m = lengths_m * np.cos(np.radians(azimuths_deg - line_deg))
                 rank = np.empty(len(ways), dtype=np.int64)
-                rank[np.argsort(along_m, kind="stable")] = np.arange(len(ways))
+                for flights in at_once:
+                    rank[np.array(flights)[np.argsort(along_m[flights], kind="stable")]] = np.arange(len(flights))
                 yield tuple(_beside(home, line_deg, float(step) * (spacing * separation_m + wide_m)) for step in rank)
 
 

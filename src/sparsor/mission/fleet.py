@@ -1,9 +1,10 @@
-"""A route for several vehicles at once: cut so that the longest of their flights is short."""
+"""A route for several vehicles at once, in one round or more: cut so that the longest of their flights is short."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
-from itertools import combinations
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,10 +20,13 @@ _BARRED_S = 1e9
 
 Cut = list[tuple[int, list[int]]]
 """Home and stops of each flight."""
+Flown = tuple[int, ...]  # flights from each home
 
 
-def balanced_flights(costs: SortieCosts, vehicles: int, *, seed: int = 0, iterations: int = ITERATIONS) -> Cut:
-    """Return flights over all stops, as many as vehicles at most, the longest as short as was found.
+def balanced_flights(
+    costs: SortieCosts, vehicles: int, *, rounds: int = 1, seed: int = 0, iterations: int = ITERATIONS
+) -> Cut:
+    """Return flights over all stops, one a vehicle and round at most, the longest as short as was found.
 
     The route is cut where its longest part is shortest; then PyVRP is asked for flights that are all shorter, again and
     again, and at last for the least in all that is no longer.
@@ -31,23 +35,52 @@ def balanced_flights(costs: SortieCosts, vehicles: int, *, seed: int = 0, iterat
     ----------
     costs : SortieCosts
         With one home, which all take off from, or one for each vehicle.
-    vehicles : int
+    vehicles, rounds : int
     seed, iterations : int
         Of PyVRP, which ends by a count.
     """
-    best = cut_evenly(costs, vehicles)
-    own = costs.homes > 1
+    best = cut_evenly(costs, vehicles, rounds)
+    most = _flights_a_home(costs, vehicles, rounds)
+
+    def shorter(than_s: float) -> Cut | None:
+        return routes(replace(costs, limit_s=than_s), seed=seed, iterations=iterations, sorties=most)
+
     for _ in range(MOST_TRIES):
-        limited = replace(costs, limit_s=SHORTER * longest_s(costs, best))
-        found = routes(limited, seed=seed, iterations=iterations, sorties=1 if own else vehicles)
+        found = shorter(SHORTER * longest_s(costs, best))
         if found is None or longest_s(costs, found) >= longest_s(costs, best):
             break
         best = found
-    limited = replace(costs, limit_s=longest_s(costs, best) + 1.0)
-    found = routes(limited, seed=seed, iterations=iterations, sorties=1 if own else vehicles)
+    found = shorter(longest_s(costs, best) + 1.0)
     if found is not None and longest_s(costs, found) <= longest_s(costs, best):
         best = min(best, found, key=lambda cut: sum(costs.used_s(stops, home) for home, stops in cut))
     return best
+
+
+def in_rounds(cut: Cut, vehicles: int, *, own: bool) -> list[Cut]:
+    """Return flights by round: no more in each than there are vehicles, of homes of their own one from each.
+
+    From one home flights beside each other on the route come in different rounds, where that can be: those at once are
+    farther apart.
+
+    Examples
+    --------
+    >>> in_rounds([(0, [0]), (0, [1]), (0, [2]), (0, [3])], 2, own=False)
+    [[(0, [0]), (0, [2])], [(0, [1]), (0, [3])]]
+    >>> in_rounds([(1, [0, 1]), (0, [2]), (1, [3])], 2, own=True)
+    [[(1, [0, 1]), (0, [2])], [(1, [3])]]
+    """
+    along = sorted(cut, key=lambda flight: min(flight[1]))
+    if not own:
+        count = -(-len(along) // vehicles)
+        return [along[first::count] for first in range(count)]
+    rounds: list[Cut] = []
+    taken: Counter[int] = Counter()
+    for home, stops in along:
+        if taken[home] == len(rounds):
+            rounds.append([])
+        rounds[taken[home]].append((home, stops))
+        taken[home] += 1
+    return rounds
 
 
 def longest_s(costs: SortieCosts, cut: Cut) -> float:
@@ -55,44 +88,49 @@ def longest_s(costs: SortieCosts, cut: Cut) -> float:
     return max(costs.used_s(stops, home) for home, stops in cut)
 
 
-def cut_evenly(costs: SortieCosts, vehicles: int) -> Cut:
-    """Return the route in parts, one a vehicle at most, whose longest is as short as any cut makes it.
+def cut_evenly(costs: SortieCosts, vehicles: int, rounds: int = 1) -> Cut:
+    """Return the route in parts, one a vehicle and round at most, whose longest is as short as any cut makes it.
 
-    Dynamic programming: of one home over the number of parts, of a home for each vehicle over the homes taken.
+    Dynamic programming over the number of parts flown from each home.
     """
     used_s = _used_by_parts(costs)
-    own = costs.homes > 1
-    taken: list[tuple[int, ...]] = [()]
-    if own:
-        taken += [homes for size in range(1, costs.homes + 1) for homes in combinations(range(costs.homes), size)]
-    else:
-        taken += [(0,) * size for size in range(1, vehicles + 1)]
+    most = _flights_a_home(costs, vehicles, rounds)
     start = np.full(costs.count + 1, np.inf)
     start[0] = 0.0
-    best: dict[tuple[int, ...], NDArray[np.float64]] = {(): start}
-    came: dict[tuple[int, ...], list[tuple[int, int]]] = {}
-    for homes in taken[1:]:
+    none = (0,) * costs.homes
+    best: dict[Flown, NDArray[np.float64]] = {none: start}
+    came: dict[Flown, list[tuple[int, int]]] = {}
+    for flown in product(range(most + 1), repeat=costs.homes):
+        if flown == none:
+            continue
         longest, before = np.full(costs.count + 1, np.inf), [(0, 0)] * (costs.count + 1)
-        for place in range(len(homes)) if own else (0,):
-            others = homes[:place] + homes[place + 1 :]
-            table = np.maximum(best[others][:-1, None], used_s[homes[place]])
+        for home in np.flatnonzero(flown).tolist():
+            table = np.maximum(best[_one_less(flown, home)][:-1, None], used_s[home])
             begins = table.argmin(axis=0)
             for end, begin in enumerate(begins.tolist()):
                 if table[begin, end] < longest[end + 1]:
-                    longest[end + 1], before[end + 1] = table[begin, end], (homes[place], begin)
-        best[homes], came[homes] = longest, before
-    homes = min(taken[1:], key=lambda one: (best[one][-1], len(one)))
-    return _parts(homes, came, costs.count)
+                    longest[end + 1], before[end + 1] = table[begin, end], (home, begin)
+        best[flown], came[flown] = longest, before
+    flown = min(came, key=lambda one: (best[one][-1], sum(one)))
+    return _parts(flown, came, costs.count)
 
 
-def _parts(homes: tuple[int, ...], came: dict[tuple[int, ...], list[tuple[int, int]]], count: int) -> Cut:
+def _flights_a_home(costs: SortieCosts, vehicles: int, rounds: int) -> int:
+    """Return how often is taken off from each home at most: by every vehicle, or by the one whose home it is."""
+    return rounds if costs.homes > 1 else rounds * vehicles
+
+
+def _one_less(flown: Flown, home: int) -> Flown:
+    return (*flown[:home], flown[home] - 1, *flown[home + 1 :])
+
+
+def _parts(flown: Flown, came: dict[Flown, list[tuple[int, int]]], count: int) -> Cut:
     parts: Cut = []
     end = count
     while end > 0:
-        home, begin = came[homes][end]
+        home, begin = came[flown][end]
         parts.append((home, list(range(begin, end))))
-        place = homes.index(home)
-        homes, end = homes[:place] + homes[place + 1 :], begin
+        flown, end = _one_less(flown, home), begin
     return parts[::-1]
 
 

@@ -63,6 +63,9 @@ class Sidecar:
         Of a resumed mission: stops that earlier flights measured already, in their flight order.
     heights_m : tuple of float
         Above home, of vehicles at once that fly each at their own; `altitude_m` is the lowest of them.
+    rounds : mapping of str to int
+        Of vehicles at once that take off more than once: plan file name to the round in which it is flown, from 1.
+        Those of one round are in the air together, those of different rounds never are.
     above_ground : bool
         Whether `altitude_m` is above the ground, which `way` then follows.
     way : array of float64 (n, 3)
@@ -89,6 +92,7 @@ class Sidecar:
     kept_out: NDArray[np.bool_] | None = None
     flown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     heights_m: tuple[float, ...] = ()
+    rounds: Mapping[str, int] = field(default_factory=dict)
     above_ground: bool = False
     way: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
@@ -112,6 +116,8 @@ def sidecar_npz(sidecar: Sidecar) -> bytes:
         about["passing"] = [list(place) for place in sidecar.passing]
     if sidecar.heights_m:
         about["heights_m"] = list(sidecar.heights_m)
+    if sidecar.rounds:
+        about["rounds"] = dict(sidecar.rounds)
     if sidecar.above_ground:
         about["above_ground"] = True
         about["way"] = [[None if value != value else value for value in row] for row in sidecar.way.tolist()]
@@ -192,6 +198,7 @@ def _from_arrays(about: dict[str, Any], arrays: Mapping[str, NDArray[Any]], mode
         kept_out=None if kept_out is None else kept_out.astype(np.bool_),
         flown=flown,
         heights_m=tuple(float(height_m) for height_m in about.get("heights_m", ())),
+        rounds={str(key): int(value) for key, value in about.get("rounds", {}).items()},
         above_ground=bool(about.get("above_ground", False)),
         way=np.array(about.get("way", []), dtype=np.float64).reshape(-1, 3),
     )

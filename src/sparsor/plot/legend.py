@@ -36,7 +36,7 @@ def legend_entries(
         entries.append((_line(style.NUMBERED_STOP), _stops_label(view, picture)))
     if picture.transits:
         entries.append((_line(style.TRANSIT), "from and to home"))
-    if picture.home is not None:
+    if picture.homes:
         entries.append((_home_handle(), _home_label(view, picture)))
     if picture.fence is not None:
         entries.append((_line(style.FENCE), "fence"))
@@ -85,8 +85,10 @@ def _stops_label(view: View, picture: MissionPicture) -> str:
 
 
 def _home_label(view: View, picture: MissionPicture) -> str:
-    """Say where home is when its symbol does not: at a stop, or off the map."""
-    home = np.array([picture.home], dtype=np.float64)
+    """Say where home is when its symbol does not: at a stop, or off the map; of several how many there are."""
+    if len(picture.homes) > 1:
+        return f"{len(picture.homes)} homes"
+    home = np.array(picture.homes, dtype=np.float64)
     place = view.inches(home)[0]
     if picture.stops is not None and len(picture.stops):
         apart = np.hypot(*(view.inches(picture.stops) - place).T)

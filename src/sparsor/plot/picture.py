@@ -40,8 +40,7 @@ class MissionPicture:
         Instead of a route, the paths of several flights over their stops.
     transits : tuple of arrays (n, 2)
         The ways from home to the route, or to each sortie's, and back.
-    home : tuple of float, optional
-        Longitude and latitude.
+    homes : tuple of (longitude, latitude)
     fence : array (n, 2), optional
         Corners of the inclusion fence; closed by the drawing.
     area : tuple of arrays (n, 2)
@@ -77,7 +76,7 @@ class MissionPicture:
     route: NDArray[np.float64] | None = None
     sorties: tuple[NDArray[np.float64], ...] = ()
     transits: tuple[NDArray[np.float64], ...] = ()
-    home: tuple[float, float] | None = None
+    homes: tuple[tuple[float, float], ...] = ()
     fence: NDArray[np.float64] | None = None
     area: tuple[NDArray[np.float64], ...] = ()
     keep_outs: tuple[NDArray[np.float64], ...] = ()
@@ -99,7 +98,7 @@ class MissionPicture:
                 raise ValueError(f"{name} has shape {points.shape}; points are rows of longitude and latitude")
 
     def outlines(self) -> list[tuple[str, NDArray[np.float64]]]:
-        """Return the name and the points of everything that the map is made large enough for, home included.
+        """Return the name and the points of everything that the map is made large enough for, homes included.
 
         Keep-outs, margins and the coast are shown as far as they reach into it.
         """
@@ -107,5 +106,5 @@ class MissionPicture:
         named += [("sorties", points) for points in self.sorties]
         named += [("transits", points) for points in self.transits]
         named += [("area", points) for points in self.area]
-        named += [("home", None if self.home is None else np.array([self.home], dtype=np.float64))]
+        named += [("home", np.array([home], dtype=np.float64)) for home in self.homes]
         return [(name, points) for name, points in named if points is not None]

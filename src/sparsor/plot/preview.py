@@ -66,5 +66,5 @@ def _draw_flight(axes: Axes, view: View, picture: MissionPicture) -> None:
         draw_route(axes, view, sortie, sortie_style(number))
     if picture.stops is not None and len(picture.stops):
         draw_stops(axes, view, picture.stops)
-    if picture.home is not None:
-        draw_home(axes, view, picture, picture.home)
+    for home in picture.homes:
+        draw_home(axes, view, picture, home)
