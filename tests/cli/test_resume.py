@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import tomllib
@@ -188,6 +189,28 @@ def test_a_budget_in_per_cent_is_of_what_may_be_flown_to(here):
     )
 
 
+def test_a_keep_out_comes_to_those_of_the_mission(here):
+    """One that was replaced unseen would be flown over."""
+    there = Path(__file__).parents[2] / "geo" / "keep-out-example.geojson"
+    crane = {"type": "Point", "coordinates": [51.52, 25.285]}
+    feature = {"type": "Feature", "properties": {"radius_m": 150}, "geometry": crane}
+    Path("crane.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    words = ("--bbox", *BOX, "--name", "past", "--keep-out", there, "--t90", 0)
+    assert here("generate-mission", *words, *SOON).code == 0
+    flight(Path("missions/past/past.plan"), Path("past.csv"), part=0.4)
+    result = resumed(here, "--keep-out", "crane.geojson", "--keep-out", there, log="past.csv", mission="missions/past")
+    asked = tomllib.loads(Path("missions/past-2/mission.toml").read_text(encoding="utf-8"))["flight"]["keep_out"]
+    assert [Path("missions/past-2", path).resolve() for path in asked] == [there, Path("crane.geojson").resolve()]
+    more = result["cells_kept_out"]
+    assert more > read_sidecar(Path("missions/past/past.npz")).kept_out.sum() > 0
+    # And of a mission.toml that is planned again.
+    again = here(
+        "generate-mission", "missions/past/mission.toml", "--keep-out", "crane.geojson", "-o", "again", "--json"
+    )
+    assert again.code == 0, again.err
+    assert again.result["cells_kept_out"] == more
+
+
 def test_several_homes_in_the_place_of_the_first_stop(here):
     result = resumed(here, "--home", 51.504, 25.2815, "--home", 51.52, 25.275, "-o", "rest")
     assert result["plans"] == ["rest/rest.plan"]
@@ -204,6 +227,7 @@ MISTAKES = {
         "--resume doha.csv --mission missions/doha --field f.tif --altitude 30 --rows 9 --pareto",
         "--field, --rows, --altitude, --pareto: not with a mission",
     ),
+    "a coast": ("--resume doha.csv --mission missions/doha --sea-only", "--sea-only: not with a mission"),
     "a terrain": ("--resume doha.csv --mission missions/doha --terrain dem.tif", "--terrain: not with a mission"),
     "the other planner": (
         "--resume doha.csv --mission missions/doha --planner monte-carlo",

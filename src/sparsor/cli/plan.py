@@ -267,7 +267,8 @@ def plan(
         list[Path] | None,
         _option(
             FLIGHT,
-            "GeoJSON or KML of what not to fly over: polygons, and circles as points with radius_m; repeatable.",
+            "GeoJSON or KML of what not to fly over: polygons, and circles as points with radius_m; repeatable, added "
+            "to those of FILE.toml or --mission.",
             "--keep-out",
             metavar="FILE",
         ),

@@ -36,6 +36,7 @@ _FIXED = {
         "lambda_path": "--lambda-path",
         "lambda_incoh": "--lambda-incoh",
     },
+    "coast": {"side": "--land-only, --sea-only", "file": "--coastline", "accuracy_m": "--coastline-accuracy"},
     "flight": {"altitude_m": "--altitude", "terrain": "--terrain", "terrain_tolerance_m": "--terrain-tolerance"},
 }
 
@@ -92,8 +93,8 @@ def check_given(given: dict[str, Any], *, pareto: bool) -> None:
     names += ["--pareto"] if pareto else []
     if names:
         raise MissionError(
-            f"{', '.join(names)}: not with a mission that is resumed: its box, height and model are those that it was "
-            "flown with, and the rest is planned by the refined search; leave it out"
+            f"{', '.join(names)}: not with a mission that is resumed: its box, coast, height and model are those that "
+            "it was flown with, and the rest is planned by the refined search; leave it out"
         )
 
 

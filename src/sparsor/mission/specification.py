@@ -398,6 +398,8 @@ def _as_its_vehicle_moves(spec: MissionSpecification, given: Mapping[str, object
 def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> MissionSpecification:
     """Return a specification with what `data` gives in place of its own; a new area replaces the old.
 
+    Keep-outs come to those that are there: one that was left out unseen would be flown over.
+
     Raises
     ------
     MissionError
@@ -425,6 +427,7 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
         for name, usual in (("altitude_m", (ALTITUDE_M, 0.0)), ("hold_s", (HOLD_S, 0.0))):
             if flight[name] in usual:  # it suited the vehicle of then
                 del flight[name]
+    there, added = flight.get("keep_out", ()), _without_none(data.get("flight", {})).get("keep_out", ())
     for section, values in _without_none(data).items():
         if section in ("area", "sensor") and values:  # of two that exclude each other
             merged[section] = values
@@ -432,6 +435,8 @@ def changed(spec: MissionSpecification, data: dict[str, Any], *, base: Path) -> 
             merged[section] = {**merged.get(section, {}), **values}
         else:
             merged[section] = values
+    if added:
+        merged["flight"]["keep_out"] = tuple(dict.fromkeys((base / path).resolve() for path in (*there, *added)))
     return specification(merged, base=base)
 
 
