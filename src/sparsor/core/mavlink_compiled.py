@@ -9,8 +9,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.core.mavlink_frames import (
     CHECKSUM,
     HEADER_V1,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import warnings
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import metadata
 from platform import python_version
@@ -97,8 +97,12 @@ def _processes(count: int | None) -> Iterator[Client]:
         dashboard_address=None,
         silence_logs=logging.CRITICAL + 1,
     )
-    with cluster, Client(cluster, timeout=_START_S, set_as_default=False) as client:
-        yield client
+    try:
+        with Client(cluster, timeout=_START_S, set_as_default=False) as client:
+            yield client
+    finally:
+        with suppress(AssertionError):  # of dask, when a worker that died is just being started again
+            cluster.close()
 
 
 @contextmanager

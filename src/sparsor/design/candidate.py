@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.design.basis import add_row, aligned
 from sparsor.design.homotopy import Room, make_room
 from sparsor.design.lars import Atoms, make_atoms, solve_lasso

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.design.basis import add_row, aligned, remove
 
 if TYPE_CHECKING:

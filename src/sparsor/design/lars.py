@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.design.basis import aligned, append, combine
 from sparsor.design.homotopy import Room, advance, begin, join, leave, make_room, next_event
 from sparsor.design.optimality import descend, violation

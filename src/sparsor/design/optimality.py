@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.design.basis import combine
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
+
+from sparsor.core.compiled import njit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

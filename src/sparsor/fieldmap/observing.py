@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.fieldmap.kalman import response_shares
 from sparsor.fieldmap.mission_part import OUTSIDE
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.geodesy.lengths import distance_m
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.flightlog.selfdescribed import HEAD, Format, Messages
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numba import njit
 
+from sparsor.core.compiled import njit
 from sparsor.flightlog.log import DroppedFixes, Places, Track
 
 if TYPE_CHECKING:

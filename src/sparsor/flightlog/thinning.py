@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numba import njit
+
+from sparsor.core.compiled import njit
 
 if TYPE_CHECKING:
     from collections.abc import Callable

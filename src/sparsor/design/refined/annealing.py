@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.core.compiled import njit
 from sparsor.design.refined.costs import Costs, used
 from sparsor.design.refined.crossings import crosses
 from sparsor.design.refined.dense import gram, solve

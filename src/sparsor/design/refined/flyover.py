@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.core.compiled import njit
 from sparsor.design.legs import crossing_table
 
 if TYPE_CHECKING:

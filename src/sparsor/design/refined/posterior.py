@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.core.compiled import njit
 from sparsor.design.refined.dense import inner_products, inverse_root, solve
 
 LEVEL_VARIANCE = 100.0  # of the map's own: as good as unknown

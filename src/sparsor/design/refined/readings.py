@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray  # noqa: TC002
 
+from sparsor.core.compiled import njit
 from sparsor.design.refined.posterior import Belief
 
 T90_OVER_TAU: Final = float(np.log(10.0))
