@@ -189,11 +189,39 @@ def test_flights_of_different_rounds_stand_in_the_same_places_and_may_cross():
         separation_m=12.0, rounds=rounds,
     )  # fmt: skip
     assert found is not None
-    assert len({(plan.home.lon_deg, plan.home.lat_deg) for plan in found.plans}) == 2
-    assert [sorted(found.heights_m[k : k + 2]) for k in (0, 2, 4)] == [[30.0, 42.0], [30.0, 42.0], [30.0]]
-    pairs = [nearest(found.plans[k : k + 2], QUAD).distance_m for k in (0, 2)]
-    assert found.distance_m == min(pairs) >= 12.0
+    # A vehicle keeps its place and its height.
+    assert len({(plan.home, height_m) for plan, height_m in zip(found.plans, found.heights_m, strict=True)}) == 2
+    assert [sorted(found.vehicles[k : k + 2]) for k in (0, 2, 4)] == [[0, 1], [0, 1], [0]]
+    assert sorted(found.heights_m[:2]) == [30.0, 42.0]
+    assert all(
+        plan.stops[0].altitude_m == height_m for plan, height_m in zip(found.plans, found.heights_m, strict=True)
+    )
+    assert found.distance_m == nearest(found.plans, QUAD, rounds).distance_m
+    assert min(nearest(found.plans[k : k + 2], QUAD).distance_m for k in (0, 2)) >= found.distance_m >= 12.0
     assert nearest(found.plans, QUAD).distance_m < 1.0  # all at once they would not be apart
+
+
+def test_who_does_not_fly_in_a_round_stands_at_home():
+    def driven(stops, home):
+        return build_mission(
+            *np.transpose(stops), vehicle=ROVER, autopilot="px4", altitude_m=0.0, home=Home(*home)
+        )  # fmt: skip
+
+    first = driven([(51.50, 25.301), (51.50, 25.302)], (51.50, 25.30))
+    second = driven([(51.51, 25.301), (51.51, 25.302)], (51.51, 25.30))
+    through = driven([(51.505, 25.30), (51.515, 25.30)], (51.50, 25.30))
+    assert nearest([first, second], ROVER).distance_m > 500
+    found = nearest([first, second, through], ROVER, (1, 1, 2))
+    assert (found.first, found.second, found.parked) == (2, 1, True)
+    assert found.distance_m < 1.0
+    assert not nearest([first, second, through], ROVER, (1, 2, 3)).distance_m > 1.0
+    # And no such rounds are planned.
+    plans = [first, second, through]
+    ways = [((51.50, 25.301), (51.50, 25.302)), ((51.51, 25.301), (51.51, 25.302)), ((51.505, 25.30), (51.515, 25.30))]
+    homes = [plan.home for plan in plans]
+    planned = {"vehicle": ROVER, "lowest_m": 0.0, "separation_m": 10.0}
+    assert flights_apart(lambda k, *_: plans[k], ways[:2], homes[:2], **planned) is not None
+    assert flights_apart(lambda k, *_: plans[k], ways, homes, rounds=(1, 1, 2), **planned) is None
 
 
 def test_a_home_on_a_hill_counts_where_its_height_is_known():

@@ -268,7 +268,7 @@ def plan(
         _option(
             FLIGHT,
             "GeoJSON or KML of what not to fly over: polygons, and circles as points with radius_m; repeatable, added "
-            "to those of FILE.toml or --mission.",
+            "to those of FILE.toml or --mission (which can be edited).",
             "--keep-out",
             metavar="FILE",
         ),

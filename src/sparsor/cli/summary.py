@@ -38,6 +38,7 @@ def mission_values(mission: PlannedMission, folder: Path) -> dict[str, object]:
         "vehicles": spec.flight.vehicles,
         "vehicles_apart_m": mission.sorties.apart_m if mission.sorties else None,
         "rounds": list(mission.sorties.rounds) if mission.sorties else [],
+        "vehicle_of_each": list(mission.sorties.vehicles) if mission.sorties else [],
         "sortie_times_s": [time.seconds for time in mission.sorties.times] if mission.sorties else [],
         "expected_relative_error": mission.expected_relative_error,
         "expected_relative_error_cells": mission.expected_relative_error_cells,

@@ -13,6 +13,7 @@ from sparsor.errors import TerrainError
 from sparsor.geodesy.lengths import distance_m, from_wgs84, offset_deg, to_wgs84, vertical_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -29,7 +30,7 @@ METRES_OF = {
 LOWEST_M, HIGHEST_M = -500.0, 9000.0  # the Dead Sea's shore, Mount Everest
 MOST_PIXELS = 60_000_000
 SPARE_PIXELS = 4
-UNEVEN = 1.02  # the sides of pixels are measured in one place; degrees are shorter farther from the equator
+UNEVEN = 1.01  # the sides of pixels are those at the corners of what is read; a map's scale may have its least between
 SIDE_POINTS = 9  # along each side of what is read, when it is brought to the raster's own system
 
 
@@ -52,7 +53,7 @@ class Terrain:
         Longitude, as the raster counts them, that others are brought to within half a turn of; None of a system in
         metres.
     pixel_m : tuple of float
-        Width and height of a pixel.
+        Width and height of a pixel, the least in this part.
     vertical : str or None
         What the file says that its heights are above.
     unit_said : bool
@@ -229,14 +230,14 @@ def _part(dataset: DatasetReader, path: Path, lon: NDArray[np.float64], lat: NDA
             [inverse.d, inverse.e, inverse.f - top - 0.5],
         ]
     )
-    at = ((left + right) / 2, (top + bottom) / 2)
+    corners = [(column, row) for column in (left, right - 1) for row in (top, bottom - 1)]
     return Terrain(
         path=path,
         heights_m=heights.astype(np.float32),
         to_pixel=to_pixel,
         crs=crs,
         middle=middle,
-        pixel_m=_pixel_m(dataset, at, crs),
+        pixel_m=_pixel_m(dataset, corners, crs),
         vertical=vertical,
         unit_said=unit_said,
     )
@@ -278,13 +279,15 @@ def _middle(dataset: DatasetReader, x: float) -> float:
     return centre + (x - centre + 180.0) % 360.0 - 180.0
 
 
-def _pixel_m(dataset: DatasetReader, at: tuple[float, float], crs: str) -> tuple[float, float]:
-    """Return a pixel's width and height, metres."""
-    transform = dataset.transform
-    places = [transform * place for place in (at, (at[0] + 1, at[1]), (at[0], at[1] + 1))]
-    lon, lat = to_wgs84([x for x, _ in places], [y for _, y in places], crs)
-    width, height = distance_m(lon[0], lat[0], lon[1:], lat[1:])
-    if not (np.isfinite([width, height]).all() and min(width, height) > 0):
+def _pixel_m(dataset: DatasetReader, places: Sequence[tuple[float, float]], crs: str) -> tuple[float, float]:
+    """Return the least width and height of pixels at some places (column, row), metres."""
+    sides = []
+    for column, row in places:
+        corners = [dataset.transform * one for one in ((column, row), (column + 1, row), (column, row + 1))]
+        lon, lat = to_wgs84([x for x, _ in corners], [y for _, y in corners], crs)
+        sides.append(distance_m(lon[0], lat[0], lon[1:], lat[1:]))
+    width, height = np.min(sides, axis=0)
+    if not (np.isfinite(sides).all() and min(width, height) > 0):
         raise TerrainError(f"'{dataset.name}' has no pixel size in metres where it is flown")
     return float(width), float(height)
 

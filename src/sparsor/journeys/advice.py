@@ -11,6 +11,8 @@ from sparsor.geodesy.lengths import distance_m
 from sparsor.vehicle import flight_seconds
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from sparsor.journeys.planning import PlannedMission
     from sparsor.journeys.sorties import Sorties
 
@@ -56,25 +58,23 @@ def _cut_into(mission: PlannedMission) -> str:
     assert cut is not None
     usable_min = mission.usable_s / 60
     if cut.apart_m is not None:
-        heights = ", ".join(f"{height_m:g}" for height_m in sorted({*cut.heights_m}))
-        up = f", at {heights} m (ceiling {mission.vehicle.ceiling_m:g} m)" if mission.vehicle.flies else ""
-        level = ", if the homes lie level" if up else ""
-        homes = dict.fromkeys(f"{plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}" for plan in cut.plans)
+        level = ", if the homes lie level" if mission.vehicle.flies else ""
         return (
-            f"{_at_once(cut)}, none above {max(time.used_s for time in cut.times) / 60:.1f} of "
-            f"{usable_min:.1f} min{up}, each vehicle from a home of its own (see whether it can be used): "
-            f"{'; '.join(homes)}. Planned paths are never nearer than {_tenth_down(cut.apart_m)} m, whenever each "
-            f"starts{level}; what vehicles drift off their paths comes off that."
+            f"{_at_once(cut)}, none above {max(time.used_s for time in cut.times) / 60:.1f} of {usable_min:.1f} min. "
+            f"{' '.join(_each_vehicle(mission, cut))} See whether these places can be used. Planned paths are never "
+            f"nearer than {_tenth_down(cut.apart_m)} m, whenever each starts{level}; what vehicles drift off their "
+            "paths comes off that."
         )
+    alone = "One vehicle flies it all. " if mission.specification.flight.vehicles > 1 else ""
     if len(cut.plans) > 1:
-        return (
+        return alone + (
             f"One battery is not enough for the route: it is cut into {len(cut.plans)} sorties, "
             f"{sum(time.seconds for time in cut.times) / 60:.0f} min in all, none above "
             f"{max(time.used_s for time in cut.times) / 60:.1f} of {usable_min:.1f} min."
         )
     used = f"{cut.times[0].used_s / 60:.1f} of {usable_min:.1f} min"
-    if mission.specification.flight.vehicles > 1:
-        return f"One vehicle flies it all: {used}."
+    if alone:
+        return f"{alone}It takes {used}."
     if cut.dropped.size:
         return f"The others are one flight of {used}."
     return f"The route as it was found takes more than one battery; its stops in another order take {used}."
@@ -82,13 +82,22 @@ def _cut_into(mission: PlannedMission) -> str:
 
 def _at_once(cut: Sorties) -> str:
     """Return how many fly at once, and how often."""
-    vehicles = max(map(cut.rounds.count, cut.rounds))
     if max(cut.rounds) == 1:
-        return f"{vehicles} vehicles at once"
+        return f"{len(cut.plans)} vehicles at once"
     return (
-        f"One battery each is not enough: {len(cut.plans)} flights in {max(cut.rounds)} rounds of {vehicles} vehicles "
-        "at once (nobody takes off before all of the round before have landed)"
+        f"One battery each is not enough: {max(cut.vehicles)} vehicles at once, {len(cut.plans)} flights in "
+        f"{max(cut.rounds)} rounds (nobody takes off before all of the round before have landed)"
     )
+
+
+def _each_vehicle(mission: PlannedMission, cut: Sorties) -> Iterator[str]:
+    """Yield where each vehicle stands, how high it flies, and what."""
+    each = list(zip(cut.vehicles, cut.heights_m, cut.plans, mission.plan_files, strict=True))
+    for number in sorted({*cut.vehicles}):
+        height_m, plan = next((height_m, plan) for its, height_m, plan, _ in each if its == number)
+        files = ", ".join(file for its, _, _, file in each if its == number)
+        up = f", at {height_m:g} m" if mission.vehicle.flies else ""
+        yield f"Vehicle {number} from {plan.home.lon_deg:.5f} {plan.home.lat_deg:.5f}{up}: {files}."
 
 
 def _tenth_down(metres: float) -> str:

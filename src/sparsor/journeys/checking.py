@@ -104,18 +104,17 @@ def _apart(folder: Path, plans: tuple[Path, ...], vehicle: str | None) -> tuple[
         return None, ()
     sidecar = sidecar_of(own[0])
     round_of = {} if sidecar is None else sidecar.rounds
-    at_once = [[one for one in own if round_of.get(one.name, 1) == number] for number in {1, *round_of.values()}]
-    least_m = spec.flight.separation_m
-    nearest_m, faults = math.inf, []
-    for files in at_once:
-        found = nearest([read_plan(one) for one in files], profile)
-        nearest_m = min(nearest_m, found.distance_m)
-        if found.distance_m < least_m - TOLERANCE_M:
-            faults.append(
-                f"{files[found.first].name} and {files[found.second].name} may come as near as {found.distance_m:.1f} "
-                f"m to each other when they are flown at once; the mission asks for {least_m:g} m."
-            )
-    return (nearest_m if nearest_m < math.inf else None), tuple(faults)
+    found = nearest([read_plan(one) for one in own], profile, [round_of.get(one.name, 1) for one in own])
+    if found.distance_m == math.inf:
+        return None, ()
+    least_m, first, second = spec.flight.separation_m, own[found.first].name, own[found.second].name
+    if found.distance_m >= least_m - TOLERANCE_M:
+        return found.distance_m, ()
+    whom = f"the vehicle of {second}, which stands at its home," if found.parked else second
+    return found.distance_m, (
+        f"{first} may come as near as {found.distance_m:.1f} m to {whom} when they are flown at once; the mission asks "
+        f"for {least_m:g} m.",
+    )
 
 
 def _faults(path: Path, vehicle: str | None, terrain: Path | None, clearance_m: float | None) -> list[Fault]:

@@ -32,7 +32,7 @@ FAILSAFE = (
 
 
 def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorties | str:
-    """Return flights of several vehicles at once, in as few rounds as their batteries allow; parameters as for sorties.
+    """Return flights of several vehicles at once, in as few rounds as were found; parameters as for sorties.
 
     Or a sentence that says why there are none.
 
@@ -48,14 +48,16 @@ def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorti
     if said:
         return said
     costs = sortie_costs(flights, flights.homes, kept, alone_s[:, kept])
-    for rounds in range(1, -(-kept.size // flight.vehicles) + 1):
+    own = costs.homes > 1
+    at_once = 1 if own else min(flight.vehicles, kept.size)  # at least, of flights of one stop each
+    for rounds in range(1, -(-kept.size // at_once) + 1):
         even = cut_evenly(costs, flight.vehicles, rounds)
-        if longest_s(costs, even) > HOPELESS * costs.limit_s:
+        if HOPELESS * costs.limit_s < longest_s(costs, even) < np.inf:
             continue
         cut = _balanced(flights, costs, kept, even, rounds, error)
         if longest_s(costs, cut) > costs.limit_s - MARGIN_S:
             continue
-        by_round = in_rounds(cut, flight.vehicles, own=costs.homes > 1)
+        by_round = in_rounds(cut, flight.vehicles, own=own)
         sorties = _apart(flights, [[(home, kept[stops]) for home, stops in one] for one in by_round])
         if all(time.used_s <= costs.limit_s for time in sorties.times):
             return replace(sorties, dropped=np.setdiff1d(np.arange(flights.stops.size), kept))
@@ -71,8 +73,8 @@ def _balanced(
 ) -> Cut:
     """Return flights whose longest is short; in another order than the route's where the map does not lose by it."""
     spec = flights.spec
-    found = balanced_flights(costs, spec.flight.vehicles, rounds=rounds, seed=spec.search.seed)
-    if error is None or found == even:
+    found = balanced_flights(costs, spec.flight.vehicles, rounds=rounds, even=even, seed=spec.search.seed)
+    if error is None or found == even or longest_s(costs, even) == np.inf:
         return found
     lost = error([kept[stops] for _, stops in found]) > error([kept[stops] for _, stops in even])
     return even if lost else found
@@ -138,15 +140,28 @@ def _apart(flights: Flights, cut: Sequence[Sequence[tuple[int, NDArray[np.int64]
     )
     if found is None:
         raise MissionError(_not_apart(flights, max(map(len, cut))))
-    return Sorties(
-        found.plans,
-        tuple(flights.time(plan) for plan in found.plans),
-        orders,
+    given = list(flight.given_homes)  # in which order vehicles are counted; the flights' own begins with the best
+    vehicles = [given.index(_place(flights.homes[home])) for _, home, _ in each] if own else found.vehicles
+    placed = sorted(range(len(each)), key=lambda place: (rounds[place], vehicles[place]))
+    sorties = Sorties(
+        tuple(found.plans[place] for place in placed),
+        tuple(flights.time(found.plans[place]) for place in placed),
+        tuple(orders[place] for place in placed),
         np.empty(0, dtype=np.int64),
-        apart_m=found.distance_m if max(map(len, cut)) > 1 else None,
-        heights_m=found.heights_m,
-        rounds=rounds,
     )
+    if len(each) == max(rounds):  # one after the other
+        return sorties
+    return replace(
+        sorties,
+        apart_m=found.distance_m,
+        heights_m=tuple(found.heights_m[place] for place in placed),
+        rounds=tuple(rounds[place] for place in placed),
+        vehicles=tuple(vehicles[place] + 1 for place in placed),
+    )
+
+
+def _place(home: Home) -> tuple[float, float]:
+    return home.lon_deg, home.lat_deg
 
 
 def _not_apart(flights: Flights, count: int) -> str:

@@ -42,6 +42,8 @@ class Sorties:
         Of flights at once: two are never nearer, whenever each of them starts.
     heights_m : tuple of float
         Of flights at once, above home.
+    vehicles : tuple of int
+        Of flights at once, which vehicle flies each, from 1. It keeps its home and its height.
     rounds : tuple of int
         Of flights at once, the round of each, from 1: those of one round are in the air together, and nobody takes off
         before all of the round before have landed.
@@ -54,6 +56,7 @@ class Sorties:
     apart_m: float | None = None
     heights_m: tuple[float, ...] = ()
     rounds: tuple[int, ...] = ()
+    vehicles: tuple[int, ...] = ()
 
 
 def cut_into_sorties(flights: Flights, error: OrderError | None = None) -> Sorties | str:

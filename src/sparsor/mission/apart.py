@@ -2,23 +2,23 @@
 
 Each vehicle has a height of its own, a separation above the one before, and a place of its own, where it climbs and
 lands. What is left to decide is who is higher: who climbs past the height of another must not do so near its way.
-Flights of different rounds are never in the air together; their vehicles stand in the same places.
+Where they fly in rounds, each keeps its place and its height; those of different rounds are never in the air together.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
+from itertools import permutations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sparsor.geodesy.lengths import distance_m, wgs84
-from sparsor.mission.separation import Swept, apart_m, nearest, swept
+from sparsor.mission.separation import apart_m, nearest, swept
 from sparsor.vehicle import approach_m
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -43,13 +43,24 @@ class Apart:
     plans : tuple of MissionPlan
         In the order of the flights that were given.
     heights_m : tuple of float
+    vehicles : tuple of int
+        Which vehicle flies each of them, from 0.
     distance_m : float
-        Which no two of one round are nearer than; infinite where there are no two.
+        Which no two are nearer than, see `nearest`; infinite where there are no two.
     """
 
     plans: tuple[MissionPlan, ...]
     heights_m: tuple[float, ...]
+    vehicles: tuple[int, ...]
     distance_m: float
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the flights begin and end, and which vehicle stands there."""
+
+    homes: tuple[Home, ...]
+    vehicles: tuple[int, ...]
 
 
 def flights_apart(
@@ -71,77 +82,81 @@ def flights_apart(
     ways : sequence of (first stop, last stop)
         Of each flight, longitudes and latitudes.
     homes : sequence of Home
-        One for each flight; or one alone, beside which places are looked for: in a line, in all directions.
+        One for each flight, where that of each vehicle is known; or one alone, beside which places are looked for: in a
+        line, in all directions.
     vehicle : Vehicle
     lowest_m, separation_m : float
-        Height of the lowest flight of each round, and the distance to keep, which is also that between two heights.
+        Height of the lowest vehicle, and the distance to keep, which is also that between two heights.
     rounds : sequence of int, optional
         In which round each flight is flown; default: all at once.
     """
-    numbers = np.zeros(len(ways), dtype=np.int64) if rounds is None else np.asarray(rounds)
-    at_once = [np.flatnonzero(numbers == number).tolist() for number in np.unique(numbers)]
-    own = len(homes) == len(ways)
-    tried = [tuple(homes)] if own else _places(homes[0], ways, at_once, vehicle, lowest_m, separation_m)
+    numbers = [0] * len(ways) if rounds is None else list(rounds)
+    if len(homes) == len(ways):
+        known = list(dict.fromkeys(homes))
+        tried = iter([_Places(tuple(homes), tuple(known.index(home) for home in homes))])
+    else:
+        tried = _places(homes[0], ways, numbers, vehicle, lowest_m, separation_m)
     step_m = separation_m if vehicle.flies else 0.0
     for places in tried:
-        found: dict[int, tuple[MissionPlan, float]] = {}
-        distance_m = math.inf
-        for flights in at_once:
-            apart = _apart(build, {one: places[one] for one in flights}, vehicle, lowest_m, step_m, separation_m)
-            if apart is None:
-                break
-            found |= apart[0]
-            distance_m = min(distance_m, apart[1])
-        else:
-            plans, heights_m = zip(*(found[number] for number in range(len(ways))), strict=True)
-            return Apart(plans, heights_m, distance_m)
+        found = _apart(build, places, numbers, vehicle, lowest_m, step_m, separation_m)
+        if found is not None:
+            return found
     return None
 
 
 def _apart(
-    build: Build, homes: Mapping[int, Home], vehicle: Vehicle, lowest_m: float, step_m: float, separation_m: float
-) -> tuple[dict[int, tuple[MissionPlan, float]], float] | None:
-    """Return plans and heights of flights at once, and how far apart they are; None where they are not."""
-    highest_m = lowest_m + step_m * (len(homes) - 1)
-    low, high = (
-        [swept(plan, vehicle) for number, home in homes.items() if (plan := build(number, home, height_m))]
-        for height_m in (lowest_m, highest_m)
-    )
-    order = _lowest_first(low, high, separation_m) if len(low) == len(high) == len(homes) else None
+    build: Build,
+    places: _Places,
+    rounds: Sequence[int],
+    vehicle: Vehicle,
+    lowest_m: float,
+    step_m: float,
+    separation_m: float,
+) -> Apart | None:
+    count = max(places.vehicles) + 1
+
+    def built(heights_m: Sequence[float]) -> list[MissionPlan] | None:
+        each = zip(places.homes, places.vehicles, strict=True)
+        plans = [build(number, home, heights_m[its]) for number, (home, its) in enumerate(each)]
+        flown = [plan for plan in plans if plan is not None]
+        return flown if len(flown) == len(plans) else None
+
+    low, high = built([lowest_m] * count), built([lowest_m + step_m * (count - 1)] * count)
+    if low is None or high is None:
+        return None
+    below = np.zeros((count, count), dtype=np.bool_)
+    ways = [[swept(plan, vehicle) for plan in plans] for plans in (low, high)]
+    for one, other in permutations(range(len(rounds)), 2):
+        if rounds[one] == rounds[other]:
+            near = apart_m(ways[1][one], ways[0][other]) < separation_m - TOLERANCE_M
+            below[places.vehicles[one], places.vehicles[other]] |= near
+    order = _lowest_first(below)
     if order is None:
         return None
-    numbers = list(homes)
-    heights_m = {numbers[place]: lowest_m + step_m * rank for rank, place in enumerate(order)}
-    built = {number: build(number, home, heights_m[number]) for number, home in homes.items()}
-    plans = {number: plan for number, plan in built.items() if plan is not None}
-    if len(plans) < len(homes):
+    heights_m = [lowest_m + step_m * order.index(its) for its in range(count)]
+    plans = built(heights_m)
+    if plans is None:
         return None
-    distance_m = nearest(list(plans.values()), vehicle).distance_m
+    distance_m = nearest(plans, vehicle, rounds).distance_m
     if distance_m < separation_m - TOLERANCE_M:
         return None
-    return {number: (plan, heights_m[number]) for number, plan in plans.items()}, distance_m
+    return Apart(tuple(plans), tuple(heights_m[its] for its in places.vehicles), places.vehicles, distance_m)
 
 
-def _lowest_first(low: Sequence[Swept], high: Sequence[Swept], separation_m: float) -> list[int] | None:
-    """Return the flights from the lowest to the highest, None where each order lets one climb through another's way.
+def _lowest_first(below: NDArray[np.bool_]) -> list[int] | None:
+    """Return the vehicles from the lowest to the highest, None where each order lets one climb through another's way.
 
     Who would climb or sink through another's way if it were the higher of the two has to be the lower: then it does so
     below that way.
 
     Parameters
     ----------
-    low, high : sequences of Swept
-        Each flight at the least and at the greatest height.
-    separation_m : float
+    below : array of bool (n, n)
+        Which has to be below which.
     """
-    count = len(low)
-    below = np.zeros((count, count), dtype=np.bool_)
-    for one in range(count):
-        for other in range(count):
-            below[one, other] = one != other and apart_m(high[one], low[other]) < separation_m - TOLERANCE_M
     order: list[int] = []
-    while len(order) < count:
-        free = next((one for one in range(count) if one not in order and not _waits(below, one, order)), None)
+    while len(order) < len(below):
+        free = next((one for one in range(len(below)) if one not in order and not _waits(below, one, order)), None)
         if free is None:
             return None
         order.append(free)
@@ -156,11 +171,11 @@ def _waits(below: NDArray[np.bool_], one: int, order: Sequence[int]) -> bool:
 def _places(
     home: Home,
     ways: Sequence[tuple[Point, Point]],
-    at_once: Sequence[list[int]],
+    rounds: Sequence[int],
     vehicle: Vehicle,
     lowest_m: float,
     separation_m: float,
-) -> Iterator[tuple[Home, ...]]:
+) -> Iterator[_Places]:
     """Yield places for the flights in a line from home, each way round, farther and farther apart.
 
     A flight that goes farther along the line than others of its round has a place farther along it, so that the ways
@@ -171,15 +186,18 @@ def _places(
     middles = np.array([[(first[0] + last[0]) / 2, (first[1] + last[1]) / 2] for first, last in ways])
     azimuths_deg, lengths_m = _seen_from(base, middles)
     ahead_deg, _ = _seen_from(base, middles.mean(axis=0, keepdims=True))
+    at_once = [np.flatnonzero(np.equal(rounds, number)) for number in sorted({*rounds})]
+    rank = np.empty(len(ways), dtype=np.int64)
     for spacing in SPACINGS:
         for turned_deg in np.arange(0.0, 180.0, STEP_DEG):
             for side in (90.0, -90.0):
                 line_deg = float(ahead_deg[0]) + side + float(turned_deg)
                 along_m = lengths_m * np.cos(np.radians(azimuths_deg - line_deg))
-                rank = np.empty(len(ways), dtype=np.int64)
                 for flights in at_once:
-                    rank[np.array(flights)[np.argsort(along_m[flights], kind="stable")]] = np.arange(len(flights))
-                yield tuple(_beside(home, line_deg, float(step) * (spacing * separation_m + wide_m)) for step in rank)
+                    rank[flights[np.argsort(along_m[flights], kind="stable")]] = np.arange(flights.size)
+                step_m = spacing * separation_m + wide_m
+                homes = tuple(_beside(home, line_deg, float(step) * step_m) for step in rank)
+                yield _Places(homes, tuple(rank.tolist()))
 
 
 def _seen_from(base: Point, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

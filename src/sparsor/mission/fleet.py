@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 from sparsor.mission.sorties import ITERATIONS, SortieCosts, routes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 SHORTER = 0.96  # of the longest flight, which PyVRP is asked for
@@ -20,11 +22,16 @@ _BARRED_S = 1e9
 
 Cut = list[tuple[int, list[int]]]
 """Home and stops of each flight."""
-Flown = tuple[int, ...]  # flights from each home
 
 
 def balanced_flights(
-    costs: SortieCosts, vehicles: int, *, rounds: int = 1, seed: int = 0, iterations: int = ITERATIONS
+    costs: SortieCosts,
+    vehicles: int,
+    *,
+    rounds: int = 1,
+    even: Cut | None = None,
+    seed: int = 0,
+    iterations: int = ITERATIONS,
 ) -> Cut:
     """Return flights over all stops, one a vehicle and round at most, the longest as short as was found.
 
@@ -36,20 +43,26 @@ def balanced_flights(
     costs : SortieCosts
         With one home, which all take off from, or one for each vehicle.
     vehicles, rounds : int
+    even : list, optional
+        What `cut_evenly` returns, where that is known.
     seed, iterations : int
         Of PyVRP, which ends by a count.
     """
-    best = cut_evenly(costs, vehicles, rounds)
-    most = _flights_a_home(costs, vehicles, rounds)
+    best = cut_evenly(costs, vehicles, rounds) if even is None else even
+    most = rounds if costs.homes > 1 else rounds * vehicles
 
     def shorter(than_s: float) -> Cut | None:
         return routes(replace(costs, limit_s=than_s), seed=seed, iterations=iterations, sorties=most)
 
+    # A route with legs that may not be flown has no cut: then any flights that fit a battery are a beginning.
+    least_s = SHORTER * longest_s(costs, best) if np.isfinite(longest_s(costs, best)) else costs.limit_s
     for _ in range(MOST_TRIES):
-        found = shorter(SHORTER * longest_s(costs, best))
+        found = shorter(least_s)
         if found is None or longest_s(costs, found) >= longest_s(costs, best):
             break
-        best = found
+        best, least_s = found, SHORTER * longest_s(costs, found)
+    if not np.isfinite(longest_s(costs, best)):
+        return best
     found = shorter(longest_s(costs, best) + 1.0)
     if found is not None and longest_s(costs, found) <= longest_s(costs, best):
         best = min(best, found, key=lambda cut: sum(costs.used_s(stops, home) for home, stops in cut))
@@ -89,48 +102,68 @@ def longest_s(costs: SortieCosts, cut: Cut) -> float:
 
 
 def cut_evenly(costs: SortieCosts, vehicles: int, rounds: int = 1) -> Cut:
-    """Return the route in parts, one a vehicle and round at most, whose longest is as short as any cut makes it.
+    """Return the route in parts, one a vehicle and round at most, whose longest is short.
 
-    Dynamic programming over the number of parts flown from each home.
+    As short as any cut makes it in one round, and from one home; with homes of their own each round flies a stretch of
+    the route, all of about one length. Dynamic programming: of one home over the number of parts, of a home for each
+    vehicle over the homes taken.
     """
     used_s = _used_by_parts(costs)
-    most = _flights_a_home(costs, vehicles, rounds)
-    start = np.full(costs.count + 1, np.inf)
+    if costs.homes == 1:
+        return _cut(used_s, [(0,) * size for size in range(1, rounds * vehicles + 1)])
+    taken = [homes for size in range(1, costs.homes + 1) for homes in combinations(range(costs.homes), size)]
+    begins = [0, *_evenly(costs, rounds), costs.count]
+    return [
+        (home, [begin + stop for stop in stops])
+        for begin, end in pairwise(begins)
+        if begin < end
+        for home, stops in _cut(used_s[:, begin:end, begin:end], taken)
+    ]
+
+
+def _evenly(costs: SortieCosts, parts: int) -> list[int]:
+    """Return where stretches of the route of about one length begin, but for the first."""
+    along_s = np.cumsum(costs.stop_s + np.append(0.0, np.minimum(np.diagonal(costs.leg_s, 1), _BARRED_S)))
+    shares = along_s[-1] * np.arange(1, parts) / parts
+    return [int(begin) for begin in np.searchsorted(along_s, shares)]
+
+
+def _cut(used_s: NDArray[np.float64], taken: Sequence[tuple[int, ...]]) -> Cut:
+    """Return stops in parts whose longest is as short as any cut makes it, with one of some choices of homes.
+
+    Parameters
+    ----------
+    used_s : array of float64 (h, n, n)
+        By a flight from each home over the stops from one to another.
+    taken : sequence of tuples
+        Homes that are flown from, those first that others are got from by adding one.
+    """
+    count = used_s.shape[1]
+    start = np.full(count + 1, np.inf)
     start[0] = 0.0
-    none = (0,) * costs.homes
-    best: dict[Flown, NDArray[np.float64]] = {none: start}
-    came: dict[Flown, list[tuple[int, int]]] = {}
-    for flown in product(range(most + 1), repeat=costs.homes):
-        if flown == none:
-            continue
-        longest, before = np.full(costs.count + 1, np.inf), [(0, 0)] * (costs.count + 1)
-        for home in np.flatnonzero(flown).tolist():
-            table = np.maximum(best[_one_less(flown, home)][:-1, None], used_s[home])
+    best: dict[tuple[int, ...], NDArray[np.float64]] = {(): start}
+    came: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    for homes in taken:
+        longest, before = np.full(count + 1, np.inf), [(0, 0)] * (count + 1)
+        for place in range(len(homes)) if used_s.shape[0] > 1 else (0,):
+            others = homes[:place] + homes[place + 1 :]
+            table = np.maximum(best[others][:-1, None], used_s[homes[place]])
             begins = table.argmin(axis=0)
             for end, begin in enumerate(begins.tolist()):
                 if table[begin, end] < longest[end + 1]:
-                    longest[end + 1], before[end + 1] = table[begin, end], (home, begin)
-        best[flown], came[flown] = longest, before
-    flown = min(came, key=lambda one: (best[one][-1], sum(one)))
-    return _parts(flown, came, costs.count)
+                    longest[end + 1], before[end + 1] = table[begin, end], (homes[place], begin)
+        best[homes], came[homes] = longest, before
+    return _parts(min(taken, key=lambda one: (best[one][-1], len(one))), came, count)
 
 
-def _flights_a_home(costs: SortieCosts, vehicles: int, rounds: int) -> int:
-    """Return how often is taken off from each home at most: by every vehicle, or by the one whose home it is."""
-    return rounds if costs.homes > 1 else rounds * vehicles
-
-
-def _one_less(flown: Flown, home: int) -> Flown:
-    return (*flown[:home], flown[home] - 1, *flown[home + 1 :])
-
-
-def _parts(flown: Flown, came: dict[Flown, list[tuple[int, int]]], count: int) -> Cut:
+def _parts(homes: tuple[int, ...], came: dict[tuple[int, ...], list[tuple[int, int]]], count: int) -> Cut:
     parts: Cut = []
     end = count
     while end > 0:
-        home, begin = came[flown][end]
+        home, begin = came[homes][end]
         parts.append((home, list(range(begin, end))))
-        flown, end = _one_less(flown, home), begin
+        place = homes.index(home)
+        homes, end = homes[:place] + homes[place + 1 :], begin
     return parts[::-1]
 
 

@@ -63,14 +63,18 @@ class Swept:
 
 
 class Nearest(NamedTuple):
-    """The least distance between any two of several plans, and which two: metres, places from 0."""
+    """The least distance between any two of several plans, and which two: metres, places from 0.
+
+    Where `parked`, the second one's vehicle stands at its home meanwhile.
+    """
 
     distance_m: float
     first: int
     second: int
+    parked: bool = False
 
 
-def nearest(plans: Sequence[MissionPlan], vehicle: Vehicle) -> Nearest:
+def nearest(plans: Sequence[MissionPlan], vehicle: Vehicle, rounds: Sequence[int] | None = None) -> Nearest:
     """Return a lower bound of the distance between any two vehicles that fly plans at once, at any time.
 
     Parameters
@@ -79,16 +83,33 @@ def nearest(plans: Sequence[MissionPlan], vehicle: Vehicle) -> Nearest:
         Where the height of a home above the sea is not known, all homes count as level.
     vehicle : Vehicle
         That flies each of them: what circles may be two turn radii beside a leg.
+    rounds : sequence of int, optional
+        In which round each is flown; default: all at once. In a round that a vehicle does not fly it stands at home.
     """
-    if len(plans) < 2:
-        return Nearest(math.inf, 0, 0)
+    numbers = [0] * len(plans) if rounds is None else list(rounds)
     known = all(plan.home.altitude_known for plan in plans)
-    ways = [swept(plan, vehicle) for plan in plans]
     raised = [plan.home.alt_amsl_m if known else 0.0 for plan in plans]
-    return min(
-        Nearest(apart_m(ways[one], ways[other], raised_m=raised[other] - raised[one]), one, other)
-        for one, other in combinations(range(len(plans)), 2)
-    )
+    homes = [(plan.home.lon_deg, plan.home.lat_deg) for plan in plans]
+    ways = [swept(plan, vehicle) for plan in plans]
+
+    def between(one: int, other: int, *, parked: bool = False) -> Nearest:
+        way = _standing(homes[other]) if parked else ways[other]
+        return Nearest(apart_m(ways[one], way, raised_m=raised[other] - raised[one]), one, other, parked)
+
+    found = [Nearest(math.inf, 0, 0)]
+    for number in sorted({*numbers}):
+        flown = [one for one, its in enumerate(numbers) if its == number]
+        there = {homes[one] for one in flown}
+        standing = [homes.index(home) for home in dict.fromkeys(homes) if home not in there]
+        found += [between(one, other) for one, other in combinations(flown, 2)]
+        found += [between(one, other, parked=True) for one in flown for other in standing]
+    return min(found)
+
+
+def _standing(home: Point) -> Swept:
+    """Return where a vehicle is that stays at home."""
+    on_the_ground = np.zeros(1)
+    return Swept(np.array([[home, home]], dtype=np.float64), on_the_ground, on_the_ground, on_the_ground)
 
 
 def apart_m(one: Swept, other: Swept, *, raised_m: float = 0.0) -> float:

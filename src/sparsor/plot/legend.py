@@ -87,7 +87,8 @@ def _stops_label(view: View, picture: MissionPicture) -> str:
 def _home_label(view: View, picture: MissionPicture) -> str:
     """Say where home is when its symbol does not: at a stop, or off the map; of several how many there are."""
     if len(picture.homes) > 1:
-        return f"{len(picture.homes)} homes"
+        off = sum(not view.shows(np.array([one]))[0] for one in picture.homes)
+        return f"{len(picture.homes)} homes" + (f", {off} off the map" if off else "")
     home = np.array(picture.homes, dtype=np.float64)
     place = view.inches(home)[0]
     if picture.stops is not None and len(picture.stops):
