@@ -55,12 +55,14 @@ def test_no_sortie_is_beyond_the_endurance_and_every_stop_in_one(prepared, seed,
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10_000), vehicles=st.integers(2, 3), own=st.booleans(), hold_s=st.sampled_from([0.0, 150.0]))
 def test_vehicles_at_once_take_off_as_often_as_their_batteries_need(seed, vehicles, own, hold_s):
-    flight = {"vehicle": "quad", "vehicles": vehicles, "hold_s": hold_s, "separation_m": 12.0}
-    spec = specification({"name": "m", "area": {"bbox": BOX}, "flight": flight}, base=Path())
-    ready = prepare(spec)
     rng = np.random.default_rng(seed)
     stops = rng.permutation(1024)[: rng.integers(3, 24)]
-    places = rng.uniform((51.50, 25.27), (51.53, 25.30), (vehicles if own else 1, 2))
+    places = [
+        tuple(place) for place in rng.uniform((51.50, 25.27), (51.53, 25.30), (vehicles if own else 1, 2)).tolist()
+    ]
+    flight = {"vehicle": "quad", "vehicles": vehicles, "hold_s": hold_s, "separation_m": 12.0, "homes": places}
+    spec = specification({"name": "m", "area": {"bbox": BOX}, "flight": flight}, base=Path())
+    ready = prepare(spec)
     route = Candidate(0, 0.0, 0.0, 0.0, 0.0, np.zeros((1, 1024), dtype=bool), stops, 0.0, 0)
     flights = Flights(spec, ready, route, tuple(Home(*place) for place in places))
     try:
@@ -73,10 +75,15 @@ def test_vehicles_at_once_take_off_as_often_as_their_batteries_need(seed, vehicl
     assert sorted(np.concatenate(cut.orders).tolist()) == list(range(stops.size))
     assert all(time.used_s <= usable_seconds(ready.vehicle) for time in cut.times)
     assert list(cut.rounds) == sorted(cut.rounds)
-    for number in range(1, max(cut.rounds) + 1):
+    for number in range(1, max(cut.rounds, default=0) + 1):
         plans = [plan for plan, its in zip(cut.plans, cut.rounds, strict=True) if its == number]
         assert 1 <= len(plans) <= vehicles
         assert nearest(plans, ready.vehicle).distance_m >= 12.0 - 1e-6
-    assert len({plan.home for plan in cut.plans}) <= vehicles
-    if max(cut.rounds) > 1:  # and not more often than they need
+    if cut.vehicles:  # else they are flown one after the other
+        assert all(1 <= its <= vehicles for its in cut.vehicles)
+        at = {(its, plan.home, plan.stops[0].altitude_m) for its, plan in zip(cut.vehicles, cut.plans, strict=True)}
+        assert len(at) == len({*cut.vehicles})  # each keeps its place and its height
+        for its, home, _ in at:
+            assert not own or (home.lon_deg, home.lat_deg) == pytest.approx(places[its - 1], abs=1e-6)
+    if max(cut.rounds, default=1) > 1:  # and not more often than they need
         assert sum(time.used_s for time in cut.times) > 0.6 * (max(cut.rounds) - 1) * usable_seconds(ready.vehicle)
