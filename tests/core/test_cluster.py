@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import socket
@@ -13,6 +14,8 @@ from operator import add, call
 
 import numpy as np
 import pytest
+from distributed import Client
+from distributed.utils import LoopRunner
 from threadpoolctl import threadpool_info
 
 from sparsor.core.cluster import Cluster
@@ -131,6 +134,31 @@ def test_nobody_at_an_address_is_said_with_the_address():
     for address in ("tcp://127.0.0.1:9", "nonsense://x", "nobody", ""):
         with pytest.raises(SchedulerError, match=f"no dask scheduler answers at '{address}'"), workers_at(address):
             pass
+
+
+def test_nothing_is_left_of_a_client_that_reached_nobody_when_the_next_one_starts(two, monkeypatch):
+    """It would close itself when it is collected, and wait for a lock of dask's that the start holds."""
+    start, there = LoopRunner._start_unlocked, []
+
+    def clients():
+        return sum(isinstance(one, Client) for one in gc.get_objects())
+
+    def look(runner):
+        there.append(clients())
+        start(runner)
+
+    gc.collect()
+    before = clients()  # that of the fixture among them
+    gc.disable()
+    try:
+        with pytest.raises(SchedulerError), workers_at("tcp://127.0.0.1:9"):
+            pass
+        monkeypatch.setattr(LoopRunner, "_start_unlocked", look)
+        with workers_at(two._client.scheduler.address):
+            pass
+    finally:
+        gc.enable()
+    assert there == [before + 1]
 
 
 def test_a_number_of_workers_is_for_those_of_our_own():

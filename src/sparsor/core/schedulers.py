@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import warnings
@@ -66,6 +67,9 @@ def workers_at(scheduler: str | None, count: int | None = None) -> Iterator[Work
         raise SchedulerError(
             f"--workers {count}: the scheduler at {scheduler} has workers of its own; leave --workers out"
         )
+    # A client that never reached anybody closes itself when it is collected. While another one starts that would wait,
+    # for good, for a lock of dask's which the start holds.
+    gc.collect()
     reached = _processes(count) if scheduler == LOCAL else _client(scheduler)
     with dask.config.set(_SETTINGS), _quiet(), reached as client:
         yield Cluster(client, scheduler)
