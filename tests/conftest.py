@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from browser import BROWSER, NAMES
 
 if TYPE_CHECKING:
     import pytest
 
-# Who runs the tests learns whether this code works here, not what luck finds: the same examples each time.
-settings.register_profile("same", derandomize=True, database=None)
+# Who runs the tests learns whether this code works here, not what luck finds, nor how busy the machine is.
+_ANY_TIME = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("same", derandomize=True, database=None, **_ANY_TIME)
+settings.register_profile("new", **_ANY_TIME)
 SITL = "SPARSOR_SITL_URL"
 NOTICES = {
     "sitl": f"{SITL} names no autopilot: the tests marked 'sitl' are left out (docs/sitl.md says how to run them)",
@@ -34,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    settings.load_profile("default" if config.getoption("examples") else "same")
+    settings.load_profile("new" if config.getoption("examples") else "same")
     config.addinivalue_line("markers", f"sitl: flies the autopilot that {SITL} names; left out when it names none")
     config.addinivalue_line("markers", f"browser: opens a page in {', '.join(NAMES)}; left out where there is none")
 

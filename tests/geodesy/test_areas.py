@@ -75,7 +75,7 @@ def test_the_areas_in_geo_are_where_they_should_be() -> None:
     assert not read_area(GEO / "doha.geojson").is_box
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], max_examples=30)
 @given(box=boxes())
 def test_a_rectangle_is_its_box(box: BoundingBox, geojson: Callable[..., Path]) -> None:
     west, south, east, north = box.as_tuple()
@@ -85,7 +85,7 @@ def test_a_rectangle_is_its_box(box: BoundingBox, geojson: Callable[..., Path]) 
     assert cells_inside(Grid(area.box), area).all()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], max_examples=30)
 @given(box=boxes(across=True), style=st.sampled_from(["cut", "jump", "above 180"]))
 def test_all_ways_to_cross_the_antimeridian_are_the_same_area(
     box: BoundingBox, style: str, geojson: Callable[..., Path]

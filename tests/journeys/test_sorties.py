@@ -30,7 +30,9 @@ def prepared(request):
     return spec, prepare(spec)
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(seed=st.integers(0, 10_000), homes=st.integers(1, 2), hold_s=st.sampled_from([0.0, 90.0]))
 def test_no_sortie_is_beyond_the_endurance_and_every_stop_in_one(prepared, seed, homes, hold_s):
     spec, ready = prepared
@@ -52,7 +54,9 @@ def test_no_sortie_is_beyond_the_endurance_and_every_stop_in_one(prepared, seed,
         assert any(np.allclose((plan.home.lon_deg, plan.home.lat_deg), place, atol=1e-6) for place in places)
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(seed=st.integers(0, 10_000), vehicles=st.integers(2, 3), own=st.booleans(), hold_s=st.sampled_from([0.0, 150.0]))
 def test_vehicles_at_once_take_off_as_often_as_their_batteries_need(seed, vehicles, own, hold_s):
     rng = np.random.default_rng(seed)

@@ -59,7 +59,9 @@ def write(tmp_path, content):
     return path
 
 
-@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(grid=grids(largest=8).filter(lambda grid: grid.size < 100) | grids(largest=8, across=True), seed=st.integers(0))
 def test_what_was_written_is_read(tmp_path, grid, seed):
     sidecar = make(grid, seed % 2**32)

@@ -65,7 +65,7 @@ areas = st.just({"bbox": BOX}) | paths.map(lambda path: {"file": path})
 outputs = optional(export=st.lists(st.sampled_from(["waypoints", "kml", "geojson"]), unique=True))
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(area=areas, prior=priors, search=searches, flight=flights, output=outputs)
 def test_what_was_written_is_read(tmp_path, area, prior, search, flight, output):
     sections = {"area": area, "prior": prior, "search": search, "flight": flight, "output": output}

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from sparsor.mission import Home, MissionPlan
     from sparsor.mission.fleet import Cut
     from sparsor.mission.sorties import SortieCosts
-# How much shorter than the route's even parts PyVRP's flights may come out.
-HOPELESS = SHORTER**-MOST_TRIES
+
+HOPELESS = SHORTER**-MOST_TRIES  # how much shorter than the route's even parts PyVRP's flights may come out
+MOST_BUILT = 4  # numbers of rounds that should fit and do not, from where the vehicles stand
 FAILSAFE = (
     "A failsafe return flies straight home at the vehicle's own return height, through the others' heights: set "
     "RTL_ALT (PX4: RTL_RETURN_ALT) of each vehicle to the height of its own plan, and expect less distance when one "
@@ -50,6 +51,7 @@ def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorti
     costs = sortie_costs(flights, flights.homes, kept, alone_s[:, kept])
     own = costs.homes > 1
     at_once = 1 if own else min(flight.vehicles, kept.size)  # at least, of flights of one stop each
+    built = 0
     for rounds in range(1, -(-kept.size // at_once) + 1):
         even = cut_evenly(costs, flight.vehicles, rounds)
         if HOPELESS * costs.limit_s < longest_s(costs, even) < np.inf:
@@ -61,6 +63,9 @@ def cut_for_vehicles(flights: Flights, error: OrderError | None = None) -> Sorti
         sorties = _apart(flights, [[(home, kept[stops]) for home, stops in one] for one in by_round])
         if all(time.used_s <= costs.limit_s for time in sorties.times):
             return replace(sorties, dropped=np.setdiff1d(np.arange(flights.stops.size), kept))
+        built += 1
+        if built == MOST_BUILT:
+            break
     return (
         f"It is not cut for {flight.vehicles} vehicles at once: what a flight takes beside its stops, from a place of "
         "its own, leaves no room for any. Take off nearer (--home LON LAT, once a vehicle), or leave --vehicles out "
