@@ -128,6 +128,8 @@ def test_a_scheduler_elsewhere_is_used_with_the_workers_it_has(scheduler, monkey
             list(hands.map(add, shared, range(9)))
         with pytest.raises(WorkersLostError, match="no worker"):
             hands.call(add, shared, 1)
+        with pytest.raises(WorkersLostError, match="no worker"):
+            hands.share(2)
 
 
 def test_nobody_at_an_address_is_said_with_the_address():

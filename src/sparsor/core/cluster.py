@@ -55,9 +55,11 @@ class Cluster:
         is made again.
         """
         import cloudpickle
+        from distributed import wait
 
         name, held = uuid.uuid4().hex, self._submit(_as_it_is, cloudpickle.dumps(given))
-        with self._failures():
+        with self._failures(), self._client.as_current():
+            self._patiently(partial(wait, [held]))
             self._client.replicate([held])  # else the first parts all go to the worker that has it
         return Shared((name, held))
 

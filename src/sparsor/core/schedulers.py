@@ -31,6 +31,8 @@ _SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1GB",  # what is shared travels in the graph, on purpose
     "distributed.scheduler.active-memory-manager.start": False,  # what is shared stays with all workers
     "distributed.worker.profile.enabled": False,
+    # A worker that died is started again; if that takes longer, dask gives up the worker for good. A busy machine does.
+    "distributed.deploy.lost-worker-timeout": "1h",
     # Without dask's MALLOC_TRIM_THRESHOLD_, with which memory goes back to the system and is asked for again all the
     # time.
     "distributed.nanny.pre-spawn-environ": ONE_THREAD,
