@@ -180,7 +180,7 @@ def _over_terrain(
         least_m = CLEARANCE_M
     try:
         terrain = terrain_under(file or planned or Path(), plan, profile)
-        home = (plan.home.lon_deg, plan.home.lat_deg)
+        home = plan.home.place
         home_m = ground_at_home_m(terrain, home)
     except TerrainError as error:
         if file is not None:

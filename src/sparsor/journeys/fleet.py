@@ -146,7 +146,7 @@ def _apart(flights: Flights, cut: Sequence[Sequence[tuple[int, NDArray[np.int64]
     if found is None:
         raise MissionError(_not_apart(flights, max(map(len, cut))))
     given = list(flight.given_homes)  # in which order vehicles are counted; the flights' own begins with the best
-    vehicles = [given.index(_place(flights.homes[home])) for _, home, _ in each] if own else found.vehicles
+    vehicles = [given.index(flights.homes[home].place) for _, home, _ in each] if own else found.vehicles
     placed = sorted(range(len(each)), key=lambda place: (rounds[place], vehicles[place]))
     sorties = Sorties(
         tuple(found.plans[place] for place in placed),
@@ -163,10 +163,6 @@ def _apart(flights: Flights, cut: Sequence[Sequence[tuple[int, NDArray[np.int64]
         rounds=tuple(rounds[place] for place in placed),
         vehicles=tuple(vehicles[place] + 1 for place in placed),
     )
-
-
-def _place(home: Home) -> tuple[float, float]:
-    return home.lon_deg, home.lat_deg
 
 
 def _not_apart(flights: Flights, count: int) -> str:

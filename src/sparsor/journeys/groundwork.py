@@ -144,7 +144,7 @@ def faults_over(
 
 def legs_of(plan: MissionPlan, ground: Ground, vehicle: Vehicle) -> list[Leg]:
     """Return the legs of a plan over the ground that it follows."""
-    home_m = ground.home_m((plan.home.lon_deg, plan.home.lat_deg))
+    home_m = ground.home_m(plan.home.place)
     return list(legs_over(plan, ground.terrain, home_m, reach_m(vehicle)))
 
 
@@ -158,9 +158,7 @@ def check_over(plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle)
     found = [
         fault.sentence
         for plan in plans
-        for fault in faults_over(
-            plan, ground.terrain, ground.least_m, vehicle, ground.home_m((plan.home.lon_deg, plan.home.lat_deg))
-        )
+        for fault in faults_over(plan, ground.terrain, ground.least_m, vehicle, ground.home_m(plan.home.place))
         if fault.fails
     ]
     if found:
@@ -170,7 +168,7 @@ def check_over(plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle)
 def ground_facts(plans: tuple[MissionPlan, ...], ground: Ground, vehicle: Vehicle) -> GroundFacts:
     """Return what plans fly over."""
     terrain = ground.terrain
-    homes = [(plan.home.lon_deg, plan.home.lat_deg) for plan in plans]
+    homes = [plan.home.place for plan in plans]
     homes_m = [ground.home_m(home) for home in homes]
     legs = [
         (leg, home_m)

@@ -20,7 +20,7 @@ def terrain_png(mission: PlannedMission) -> bytes:
     along, below, least, flown, ends = [], [], [], [], []
     before_m = 0.0
     for plan in mission.plans:
-        home_m = ground.home_m((plan.home.lon_deg, plan.home.lat_deg))
+        home_m = ground.home_m(plan.home.place)
         stops = {(stop.lon_deg, stop.lat_deg) for stop in plan.stops}
         for leg in legs_of(plan, ground, mission.vehicle):
             if leg.kind != "level":

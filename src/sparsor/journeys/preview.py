@@ -45,7 +45,7 @@ def preview_png(mission: PlannedMission) -> bytes:
             route=stops if mission.sorties is None else None,
             sorties=() if mission.sorties is None else tuple(map(_stops, mission.plans)),
             transits=_ways(mission),
-            homes=tuple(dict.fromkeys((plan.home.lon_deg, plan.home.lat_deg) for plan in mission.plans)),
+            homes=tuple(dict.fromkeys(plan.home.place for plan in mission.plans)),
             fence=_fence(mission),
             area=() if place.area is None else _rings(mission),
             keep_outs=_keep_outs(place),

@@ -172,7 +172,7 @@ def _ways(
     """Return the seconds from a home to each stop and back."""
     prepared = flights.prepared
     vehicle, speed_m_s, zones = prepared.vehicle, prepared.speed_m_s, prepared.place.zones
-    base = (home.lon_deg, home.lat_deg)
+    base = home.place
     out_s, back_s = _seconds(flights, *base, lon, lat), _seconds(flights, lon, lat, *base)
     if zones is None:
         return out_s, back_s

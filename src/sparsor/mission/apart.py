@@ -182,7 +182,7 @@ def _places(
     from home do not cross.
     """
     wide_m = 4.0 * vehicle.turn_radius_m + approach_m(vehicle, lowest_m) if vehicle.circles else 0.0
-    base = (home.lon_deg, home.lat_deg)
+    base = home.place
     middles = np.array([[(first[0] + last[0]) / 2, (first[1] + last[1]) / 2] for first, last in ways])
     azimuths_deg, lengths_m = _seen_from(base, middles)
     ahead_deg, _ = _seen_from(base, middles.mean(axis=0, keepdims=True))

@@ -112,7 +112,7 @@ def build_mission(
         )
     altitude = _checked_altitude(altitude_m if ground is None else ground.height_m, vehicle)
 
-    base = (home.lon_deg, home.lat_deg)
+    base = home.place
     layout = lay_out(
         [
             Visit(east, north, altitude, hold)

@@ -106,7 +106,7 @@ def legs_over(plan: MissionPlan, terrain: Terrain, home_m: float, reach_m: float
     The highest ground near is that within the reach and half a step, so that nothing between points is missed. Plans
     are made with more (`following.heights_along`): wherever the points of a leg lie, they hold here.
     """
-    at, up_m, name = (plan.home.lon_deg, plan.home.lat_deg), home_m, "home"
+    at, up_m, name = plan.home.place, home_m, "home"
     kind: Kind = "level"
     for number, item in enumerate(plan.items, start=1):
         if item.command == NAV_RETURN_TO_LAUNCH:

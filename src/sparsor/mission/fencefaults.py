@@ -53,7 +53,7 @@ def fence_faults(plan: MissionPlan) -> Iterator[Fault]:
 
 def _way(plan: MissionPlan) -> Iterator[Place]:
     """Yield the places of a flight in order, home first; a return to launch goes there again."""
-    home = (plan.home.lon_deg, plan.home.lat_deg)
+    home = plan.home.place
     yield ("Home", *home)
     for place, item in enumerate(plan.items, start=1):
         here = item.command in POSITION_OPTIONAL and item.params[4:6] == (0.0, 0.0)

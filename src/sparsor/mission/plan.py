@@ -48,6 +48,11 @@ class Home:
         if not -1000 <= self.alt_amsl_m <= 10_000:
             raise MissionError(f"home lies {self.alt_amsl_m:g} m above sea level; allowed are -1000..10000 m")
 
+    @property
+    def place(self) -> tuple[float, float]:
+        """Longitude and latitude, degrees."""
+        return self.lon_deg, self.lat_deg
+
 
 @dataclass(frozen=True)
 class Fence:
@@ -210,7 +215,7 @@ def transits(plan: MissionPlan) -> tuple[list[tuple[float, float]], list[tuple[f
 
     By way of the points that lead past keep-outs; without the climb out and the approach of a plane.
     """
-    home, stops = (plan.home.lon_deg, plan.home.lat_deg), plan.stops
+    home, stops = plan.home.place, plan.stops
     first, last = ((stop.lon_deg, stop.lat_deg) for stop in (stops[0], stops[-1]))
     begin, end = (
         next(index for index, item in enumerate(plan.items) if item is stop) for stop in (stops[0], stops[-1])

@@ -89,7 +89,7 @@ def nearest(plans: Sequence[MissionPlan], vehicle: Vehicle, rounds: Sequence[int
     numbers = [0] * len(plans) if rounds is None else list(rounds)
     known = all(plan.home.altitude_known for plan in plans)
     raised = [plan.home.alt_amsl_m if known else 0.0 for plan in plans]
-    homes = [(plan.home.lon_deg, plan.home.lat_deg) for plan in plans]
+    homes = [plan.home.place for plan in plans]
     ways = [swept(plan, vehicle) for plan in plans]
 
     def between(one: int, other: int, *, parked: bool = False) -> Nearest:
@@ -142,7 +142,7 @@ class _Walk:
 
     def __init__(self, plan: MissionPlan, vehicle: Vehicle) -> None:
         self._plan, self._vehicle = plan, vehicle
-        self._home: Point = (plan.home.lon_deg, plan.home.lat_deg)
+        self._home: Point = plan.home.place
         self._at, self._up = self._home, (0.0, 0.0)
         self._wide_m = 2.0 * vehicle.turn_radius_m if vehicle.circles else 0.0
         self.slabs: list[tuple[tuple[Point, Point], tuple[float, float], float]] = []

@@ -67,7 +67,7 @@ class _Watch:
 
     def __init__(self, plan: MissionPlan, vehicle: Vehicle, wind: SteadyWind) -> None:
         self._vehicle, self._wind = vehicle, wind
-        self._home = (plan.home.lon_deg, plan.home.lat_deg)
+        self._home = plan.home.place
         self._at, self._up_m = self._home, 0.0
         self._speed_m_s = vehicle.cruise_m_s
         self._course_deg: float | None = None

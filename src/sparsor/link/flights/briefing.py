@@ -95,7 +95,7 @@ def _distances(plan: MissionPlan, place: tuple[float, float] | None) -> tuple[fl
     if place is None:
         return None, None
     first = next((item for item in plan.items if item.command in WAYPOINTS), None)
-    ends = [(plan.home.lon_deg, plan.home.lat_deg)]
+    ends = [plan.home.place]
     ends += [(first.lon_deg, first.lat_deg)] if first is not None else []
     away = distance_m(*place, [lon for lon, _ in ends], [lat for _, lat in ends])
     return float(away[0]), float(away[-1])

@@ -66,5 +66,5 @@ def _is_placed(item: MissionItem) -> bool:
 
 def _lon_lat(plan: MissionPlan, item: MissionItem) -> tuple[float, float]:
     if item.command == NAV_RETURN_TO_LAUNCH:
-        return plan.home.lon_deg, plan.home.lat_deg
+        return plan.home.place
     return item.lon_deg, item.lat_deg
