@@ -173,16 +173,11 @@ def _flyable(mission: PlannedMission) -> str:
         return "yes, by endurance"
     if len(mission.plans) == 1:
         return f"yes, by endurance, in another order: {mission.sorties.times[0].seconds / 60:.1f} min"
-    minutes = [f"{one.seconds / 60:.1f}" for one in mission.sorties.times]
-    rounds = mission.sorties.rounds
-    if max(rounds, default=1) > 1:
-        each = [
-            ", ".join(its for its, number in zip(minutes, rounds, strict=True) if number == one)
-            for one in range(1, max(rounds) + 1)
-        ]
-        return f"in {len(minutes)} flights, {len(each)} rounds: {'; '.join(each)} min"
+    rounds = [", ".join(f"{one.seconds / 60:.1f}" for one in times) for times in mission.sorties.times_by_round]
+    if len(rounds) > 1:
+        return f"in {len(mission.plans)} flights, {len(rounds)} rounds: {'; '.join(rounds)} min"
     kind = "sorties" if mission.sorties.apart_m is None else "flights at once"
-    return f"in {len(minutes)} {kind}: {', '.join(minutes)} min"
+    return f"in {len(mission.plans)} {kind}: {rounds[0]} min"
 
 
 def _of_the_battery(mission: PlannedMission) -> str:

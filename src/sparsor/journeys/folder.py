@@ -179,7 +179,7 @@ def _sidecar(mission: PlannedMission, hashes: dict[str, str]) -> Sidecar:
 
 def _heights_m(mission: PlannedMission) -> tuple[float, ...]:
     """Return the heights of vehicles at once, those of the mission that is resumed among them."""
-    new = () if mission.sorties is None else mission.sorties.heights_m
+    new = () if mission.sorties is None else tuple(dict.fromkeys(mission.sorties.heights_m))
     old = () if mission.before is None else mission.before.mission.heights_m
     if mission.before is None or not (new or old):
         return new

@@ -167,12 +167,8 @@ def _minutes(mission: PlannedMission) -> str:
     """Return the minutes of each flight, round by round."""
     if mission.sorties is None:
         return f"{mission.flight_time_s / 60:.0f}"
-    rounds = mission.sorties.rounds or (1,) * len(mission.plans)
-    each = zip(mission.sorties.times, rounds, strict=True)
-    minutes = [(time.seconds / 60, number) for time, number in each]
-    return ", then ".join(
-        _listed([its for its, number in minutes if number == one], "{:.0f}") for one in sorted({*rounds})
-    )
+    rounds = mission.sorties.times_by_round
+    return ", then ".join(_listed([time.seconds / 60 for time in times], "{:.0f}") for times in rounds)
 
 
 def _listed(numbers: Sequence[float], form: str) -> str:

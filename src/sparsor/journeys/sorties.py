@@ -58,6 +58,15 @@ class Sorties:
     rounds: tuple[int, ...] = ()
     vehicles: tuple[int, ...] = ()
 
+    @property
+    def times_by_round(self) -> list[list[FlightTime]]:
+        """The times of the flights of each round; of all in one where there are no rounds."""
+        numbers = self.rounds or (1,) * len(self.times)
+        return [
+            [time for time, its in zip(self.times, numbers, strict=True) if its == number]
+            for number in sorted({*numbers})
+        ]
+
 
 def cut_into_sorties(flights: Flights, error: OrderError | None = None) -> Sorties | str:
     """Return the flights of a route, or a sentence that says why there are none.
