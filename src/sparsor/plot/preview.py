@@ -67,4 +67,4 @@ def _draw_flight(axes: Axes, view: View, picture: MissionPicture) -> None:
     if picture.stops is not None and len(picture.stops):
         draw_stops(axes, view, picture.stops)
     for home in picture.homes:
-        draw_home(axes, view, picture, home, aside=len(picture.homes) == 1)
+        draw_home(axes, view, picture, home)

@@ -72,13 +72,11 @@ def draw_stops(axes: Axes, view: View, stops: NDArray[np.float64]) -> None:
         )
 
 
-def draw_home(
-    axes: Axes, view: View, picture: MissionPicture, home: tuple[float, float], *, aside: bool = True
-) -> None:
-    """Draw home; where a stop is in its place, beside it (`aside`), clear of all lines and inside the fence."""
+def draw_home(axes: Axes, view: View, picture: MissionPicture, home: tuple[float, float]) -> None:
+    """Draw home; an only one beside a stop that is in its place, clear of all lines and inside the fence."""
     place = view.inches([home])[0]
     stops = np.empty((0, 2)) if picture.stops is None else view.inches(picture.stops)
-    if aside and len(stops) and np.hypot(*(stops - place).T).min() < ASIDE_IN * 0.7:
+    if len(picture.homes) == 1 and len(stops) and np.hypot(*(stops - place).T).min() < ASIDE_IN * 0.7:
         lines = [
             view.inches(np.vstack((points, points[:1])) if name in ("fence", "area") else points)
             for name, points in picture.outlines()
